@@ -1,0 +1,1 @@
+"""Presets and the schema of the config file, as package data."""

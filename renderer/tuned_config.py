@@ -1,0 +1,189 @@
+"""The config file: what the tuner writes and the runtime reads.
+
+    {"format": "vpltune", "version": 1, "parameters": {"intensity": 1.0, ...}, "provenance": {...}}
+
+`parameters` holds every name of the table in `renderer.artist_parameters` and nothing else.
+`provenance` is optional, says where the numbers come from, and is never acted on.
+"""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
+from renderer.atomic_file import write_text_whole
+from renderer.errors import InputError
+
+FORMAT = "vpltune"
+VERSION = 1
+DEFAULT_CONFIG_NAME = "default"
+# A real file is about 1 kB; the bound keeps a wrong path (a scene, a device) from being read whole.
+MAXIMUM_FILE_BYTES = 1 << 20
+
+Provenance = Mapping[str, str | int | float]
+
+
+@dataclass(frozen=True)
+class TunedConfig:
+    """Parameters, and where they come from."""
+
+    parameters: ArtistParameters = field(default_factory=ArtistParameters)
+    provenance: Provenance = field(default_factory=dict)
+    """Free-form names to strings or finite numbers."""
+
+
+def read_config(source: str | Path) -> TunedConfig:
+    """Read a config file, or the preset that `configs/default.json` holds for the word "default".
+
+    Raises:
+        InputError: the file cannot be read, is not JSON, has another format or a later version,
+            repeats, lacks or adds a key, or holds a value that is not finite and in range.
+    """
+    if str(source) == DEFAULT_CONFIG_NAME:
+        text = files("configs").joinpath("default.json").read_text(encoding="utf-8")
+        return parse_config(text, "configs/default.json")
+    path = Path(source)
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAXIMUM_FILE_BYTES + 1)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+    if len(content) > MAXIMUM_FILE_BYTES:
+        raise InputError(f"{path}: a config is at most {MAXIMUM_FILE_BYTES} bytes long, this file is longer")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not UTF-8 text (byte {error.start})") from error
+    return parse_config(text, str(path))
+
+
+def parse_config(text: str, where: str) -> TunedConfig:
+    """The config that `text` holds; `where` names its origin in errors. Raises as `read_config`."""
+    try:
+        document = json.loads(text, object_pairs_hook=_refuse_duplicates)
+    except _DuplicateKeyError as error:
+        raise InputError(f"{where}: key {str(error)!r:.60} stands there twice") from error
+    # RecursionError: deep nesting; ValueError: bad syntax, or an integer of more than 4300 digits.
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{where}: not JSON ({error})") from error
+    if not isinstance(document, dict):
+        raise InputError(f"{where}: must be a JSON object, got {type(document).__name__}")
+    _check_header(document, where)
+    parameters = document["parameters"]
+    if not isinstance(parameters, dict):
+        raise InputError(f"{where}: key 'parameters' must be an object, got {type(parameters).__name__}")
+    return TunedConfig(
+        parameters=ArtistParameters.validated(parameters, f"{where}: parameters"),
+        provenance=_checked_provenance(document.get("provenance", {}), where),
+    )
+
+
+def write_config(path: Path, config: TunedConfig) -> None:
+    """Write `config`, whole or not at all; what is written reads back equal.
+
+    Raises:
+        InputError: a value is out of range, or the path cannot be written to.
+    """
+    write_text_whole(Path(path), config_text(config))
+
+
+def config_text(config: TunedConfig) -> str:
+    """The file's text: keys in the table's order, numbers with all their digits.
+
+    Raises:
+        InputError: a value is out of range.
+    """
+    parameters = ArtistParameters.validated(config.parameters.as_dict())
+    document: dict[str, Any] = {
+        "format": FORMAT,
+        "version": VERSION,
+        "parameters": parameters.as_dict(),
+    }
+    if config.provenance:
+        document["provenance"] = _checked_provenance(dict(config.provenance), "config")
+    # Escaped to ASCII: a provenance may hold a file name that is not valid Unicode.
+    return json.dumps(document, indent=2, allow_nan=False) + "\n"
+
+
+def config_schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of the file, made from the parameter table."""
+    properties = {
+        spec.name: {
+            "title": spec.symbol,
+            "description": f"{spec.meaning} [{spec.unit}]",
+            "type": "integer" if spec.whole_number else "number",
+            "minimum": spec.low,
+            "maximum": spec.high,
+            "default": spec.default,
+        }
+        for spec in ARTIST_PARAMETERS
+    }
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "VPLtune config",
+        "description": "Tuned parameters of one-bounce indirect light; none has a world unit.",
+        "type": "object",
+        "required": ["format", "version", "parameters"],
+        "additionalProperties": False,
+        "properties": {
+            "format": {"const": FORMAT},
+            "version": {"const": VERSION},
+            "parameters": {
+                "type": "object",
+                "required": list(properties),
+                "additionalProperties": False,
+                "properties": properties,
+            },
+            "provenance": {
+                "description": "Where the numbers come from; never acted on.",
+                "type": "object",
+                "additionalProperties": {"type": ["string", "number"]},
+            },
+        },
+    }
+
+
+class _DuplicateKeyError(ValueError):
+    """A key stands twice in one JSON object; the standard reader would keep the last and say nothing."""
+
+
+def _refuse_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    members: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in members:
+            raise _DuplicateKeyError(key)
+        members[key] = value
+    return members
+
+
+def _check_header(document: dict[str, Any], where: str) -> None:
+    for key in ("format", "version", "parameters"):
+        if key not in document:
+            raise InputError(f"{where}: key '{key}' is missing")
+    if document["format"] != FORMAT:
+        raise InputError(f"{where}: key 'format' must be '{FORMAT}', got {document['format']!r:.60}")
+    version = document["version"]
+    if isinstance(version, bool) or not isinstance(version, int) or version < 1:
+        raise InputError(f"{where}: key 'version' must be a whole number from 1, got {version!r:.60}")
+    if version > VERSION:
+        raise InputError(f"{where}: key 'version' is {version!s:.20}, this program reads up to {VERSION}")
+    known = ("format", "version", "parameters", "provenance")
+    for key in document:
+        if key not in known:
+            raise InputError(f"{where}: unknown key {key!r:.60}; known are {', '.join(known)}")
+
+
+def _checked_provenance(provenance: Any, where: str) -> dict[str, str | int | float]:
+    if not isinstance(provenance, dict):
+        raise InputError(f"{where}: key 'provenance' must be an object, got {type(provenance).__name__}")
+    for key, value in provenance.items():
+        number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < math.inf
+        if not (number or isinstance(value, str)):
+            raise InputError(
+                f"{where}: provenance.{key!r:.60} must be a string or a finite number, got {value!r:.60}"
+            )
+    return provenance

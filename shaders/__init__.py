@@ -1,0 +1,1 @@
+"""GLSL sources, as package data; shaders/README.md says how they are named."""

@@ -33,16 +33,11 @@ def parameters_text(name, literal):
     return json.dumps(document(parameters=values)).replace('"@"', literal)
 
 
-in_range = st.fixed_dictionaries(
-    {
-        spec.name: (
-            st.integers(int(spec.low), int(spec.high))
-            if spec.whole_number
-            else st.floats(spec.low, spec.high)
-        )
-        for spec in ARTIST_PARAMETERS
-    }
-)
+def in_range(spec):
+    return st.integers(int(spec.low), int(spec.high)) if spec.whole_number else st.floats(spec.low, spec.high)
+
+
+values_in_range = st.fixed_dictionaries({spec.name: in_range(spec) for spec in ARTIST_PARAMETERS})
 provenances = st.dictionaries(
     st.text(st.characters()), st.text(st.characters()) | st.floats(allow_nan=False, allow_infinity=False)
 )

@@ -55,6 +55,7 @@ def test_glsl_compiles_and_gives_the_numbers_back(version):
     with context:
         program = context.program(vertex_shader=shader, varyings=names)
         output = context.buffer(reserve=4 * len(names))
+        context.simple_framebuffer((1, 1)).use()  # without one, a headless context refuses every draw
         context.vertex_array(program, []).transform(output, mode=moderngl.POINTS, vertices=1)
         values = np.frombuffer(output.read(), np.float32)
     # A GLSL float literal is rounded to single precision, and to nothing less on any driver we know.

@@ -1,0 +1,57 @@
+# `make demo` and `make test` do all the set-up they need, on Debian 12 with Python 3.11 and make.
+# Run `make` alone for the list of targets.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SYSTEM_STAMP := $(VENV)/.system-libraries
+PYTHON_STAMP := $(VENV)/.python-packages
+# Fit and tests are long single processes: two pytest workers keep two cores busy.
+WORKERS ?= 2
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-all bench lint clean requirements
+.DELETE_ON_ERROR:
+
+help: ## list the targets
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 16
+
+setup: $(PYTHON_STAMP) ## system libraries, virtual environment, Python packages
+
+demo: setup ## fit the shipped Cornell box; pictures and numbers go to out/demo
+	@$(BIN)/vpltune fit configs/scenes/cornell-box.glb -o out/demo
+
+test: setup ## the tests that a change must pass
+	@$(BIN)/python -m pytest -q -n $(WORKERS) -m "not slow"
+
+test-all: setup ## every test, the slow ones too
+	@$(BIN)/python -m pytest -q -n $(WORKERS)
+
+bench: setup ## the benchmarks
+	@$(BIN)/vpltune bench all
+
+lint: setup ## style, format and import rules
+	@$(BIN)/ruff check
+	@$(BIN)/ruff format --check
+	@$(BIN)/lint-imports --no-logo
+
+requirements: setup ## pin every Python package anew, with hashes
+	@$(BIN)/python -m pip install -q pip-tools
+	@$(BIN)/pip-compile -q --upgrade --generate-hashes --extra dev --all-build-deps --strip-extras \
+	    --no-header --no-annotate --no-emit-options --no-emit-index-url --no-emit-trusted-host \
+	    --no-emit-find-links -o requirements.txt pyproject.toml
+
+clean: ## remove the virtual environment and everything made
+	@rm -rf $(VENV) build dist out .pytest_cache .hypothesis .ruff_cache .import_linter_cache
+	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(SYSTEM_STAMP): scripts/install_system_libraries.sh
+	@PYTHON=$(PYTHON) sh scripts/install_system_libraries.sh
+	@test -x $(BIN)/python || { echo "setup: virtual environment in $(VENV)"; $(PYTHON) -m venv --clear $(VENV); }
+	@touch $@
+
+$(PYTHON_STAMP): $(SYSTEM_STAMP) requirements.txt pyproject.toml
+	@echo "setup: Python packages, pinned and hashed in requirements.txt"
+	@$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements.txt
+	@$(BIN)/python -m pip install -q --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@

@@ -52,6 +52,6 @@ $(SYSTEM_STAMP): scripts/install_system_libraries.sh
 
 $(PYTHON_STAMP): $(SYSTEM_STAMP) requirements.txt pyproject.toml
 	@echo "setup: Python packages, pinned and hashed in requirements.txt"
-	@$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements.txt
-	@$(BIN)/python -m pip install -q --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check --require-hashes -r requirements.txt
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $@

@@ -23,6 +23,14 @@ ldconfig=$(command -v ldconfig || echo /sbin/ldconfig)
 "$ldconfig" -p 2>/dev/null | grep -Eq 'libLLVM(-|\.so\.)(1[6-9]|2[0-9])' || missing="$missing libllvm19"
 "$PYTHON" -c 'import ensurepip, venv' 2>/dev/null || missing="$missing python3-venv"
 
+# moderngl, glcontext and flip-evaluator have no wheels for other processors; pip compiles them.
+if [ "$(uname -m)" != x86_64 ]; then
+    command -v g++ >/dev/null || missing="$missing g++"
+    "$PYTHON" -c 'import os, sys, sysconfig
+sys.exit(not os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h")))' ||
+        missing="$missing python3-dev"
+fi
+
 [ -n "$missing" ] || exit 0
 if [ "$(id -u)" -eq 0 ] && command -v apt-get >/dev/null 2>&1; then
     echo "setup: system libraries with apt:$missing"

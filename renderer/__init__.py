@@ -1,0 +1,1 @@
+"""The real-time runtime: numpy and OpenGL only, never jax or mitsuba."""

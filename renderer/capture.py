@@ -1,0 +1,84 @@
+"""Reading a drawn frame back into numpy, row 0 at the top, for the tuner, tests and picture files."""
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from jaxtyping import Bool, Float32
+
+from renderer.frame import Frame
+from renderer.views import View, ray_directions_world
+
+
+@dataclass(frozen=True, eq=False)
+class CapturedFrame:
+    """What the gather reads and what it makes, for one view; lengths in world units."""
+
+    valid: Bool[np.ndarray, "height width"]
+    """False where the camera ray leaves the scene."""
+    depth: Float32[np.ndarray, "height width"]
+    """Distance along the view axis; 0 where not valid."""
+    position_world: Float32[np.ndarray, "height width 3"]
+    normal_world: Float32[np.ndarray, "height width 3"]
+    """Shading normal, towards the camera."""
+    albedo: Float32[np.ndarray, "height width 3"]
+    direct_irradiance: Float32[np.ndarray, "height width 3"]
+    indirect_irradiance: Float32[np.ndarray, "height width 3"]
+    vpl_position_world: Float32[np.ndarray, "vpls 3"]
+    vpl_normal_world: Float32[np.ndarray, "vpls 3"]
+    vpl_footprint: Float32[np.ndarray, "vpls"]
+    """Radius of the disc that the VPL stands for."""
+    vpl_flux: Float32[np.ndarray, "vpls 3"]
+    """Reflected radiant flux [W]."""
+    scene_length: float
+    """L: flux-weighted RMS distance of the lit RSM texels from their centroid."""
+
+
+def capture_frame(frame: Frame, view: View, near_plane: float) -> CapturedFrame:
+    """Read back everything that `frame` holds of `view`, which it has just drawn."""
+    depth_buffer = read_picture(frame.gbuffer.depth)
+    valid = depth_buffer > 0.0
+    depth = np.divide(np.float32(near_plane), depth_buffer, out=np.zeros_like(depth_buffer), where=valid)
+    position = view.camera.position_world + ray_directions_world(view) * depth[..., None]
+    vpls = np.frombuffer(frame.virtual_point_lights.virtual_point_lights.read(), np.float32).reshape(-1, 12)
+    statistics = np.frombuffer(frame.virtual_point_lights.frame_statistics.read(), np.float32)
+    return CapturedFrame(
+        valid=valid,
+        depth=depth,
+        position_world=position.astype(np.float32),
+        normal_world=octahedral_decode(read_picture(frame.gbuffer.normal)),
+        albedo=read_picture(frame.gbuffer.albedo)[..., :3].astype(np.float32),
+        direct_irradiance=read_picture(frame.direct_irradiance)[..., :3],
+        indirect_irradiance=read_picture(frame.indirect_irradiance)[..., :3],
+        vpl_position_world=vpls[:, 0:3],
+        vpl_normal_world=vpls[:, 4:7],
+        vpl_footprint=vpls[:, 3],
+        vpl_flux=vpls[:, 8:11],
+        scene_length=float(statistics[2]),
+    )
+
+
+_DTYPES = {"f1": np.uint8, "f2": np.float16, "f4": np.float32, "nu2": np.uint16}
+
+
+def read_picture(texture: moderngl.Texture) -> np.ndarray:
+    """A texture as [height, width] or [height, width, channels], row 0 at the top.
+
+    Normalised 16-bit channels come back as float32 in [0, 1], other types as they are stored.
+    """
+    values = np.frombuffer(texture.read(alignment=1), _DTYPES[texture.dtype])
+    if texture.dtype == "nu2":
+        values = values.astype(np.float32) / np.float32(65535.0)
+    shape = (texture.height, texture.width)
+    values = values.reshape(shape if texture.components == 1 else (*shape, texture.components))
+    return np.ascontiguousarray(values[::-1])
+
+
+def octahedral_decode(encoded: Float32[np.ndarray, "*shape 2"]) -> Float32[np.ndarray, "*shape 3"]:
+    """Unit vectors from two channels in [0, 1]. Twin: shaders/common/octahedral.glsl."""
+    p = encoded * np.float32(2.0) - np.float32(1.0)
+    z = 1.0 - np.abs(p).sum(axis=-1)
+    sign = np.where(p >= 0.0, np.float32(1.0), np.float32(-1.0))
+    folded = np.where((z < 0.0)[..., None], (1.0 - np.abs(p[..., ::-1])) * sign, p)
+    direction = np.concatenate([folded, z[..., None]], axis=-1)
+    return (direction / np.linalg.norm(direction, axis=-1, keepdims=True)).astype(np.float32)

@@ -1,0 +1,114 @@
+"""One frame, as the diagram has it: G-buffer ► RSM ► VPLs ► gather ► resolve ► tone curve."""
+
+import moderngl
+import numpy as np
+
+from renderer import buffer_bindings
+from renderer.artist_parameters import ArtistParameters
+from renderer.camera_uniforms import CameraUniforms, camera_uniforms
+from renderer.light_faces import FACE_DTYPE, LIGHT_DTYPE, LightRecords, light_records
+from renderer.passes.direct_light import DirectLightPass
+from renderer.passes.geometry import GeometryPass
+from renderer.passes.material_resolve import MaterialResolvePass
+from renderer.passes.reflective_shadow_map import ReflectiveShadowMapPass
+from renderer.passes.tone_mapping import ToneMappingPass
+from renderer.passes.virtual_point_lights import VirtualPointLightsPass
+from renderer.passes.vpl_gather import VplGatherPass
+from renderer.render_targets import (
+    create_display_target,
+    create_gbuffer,
+    create_irradiance_target,
+    create_reflective_shadow_map,
+)
+from renderer.scene_buffers import SceneBuffers
+from renderer.views import View
+
+
+class Frame:
+    """The targets and passes for one picture size, one set of light faces and one VPL count.
+
+    Nothing is read back: what a pass makes, the next one reads on the GPU.
+    """
+
+    def __init__(
+        self,
+        context: moderngl.Context,
+        scene: SceneBuffers,
+        size: tuple[int, int],
+        rsm_resolution: int,
+        face_count: int,
+        vpl_count: int,
+    ):
+        self._context = context
+        self._scene = scene
+        self.size = size
+        self.gbuffer = create_gbuffer(context, size)
+        self.rsm = create_reflective_shadow_map(context, rsm_resolution, face_count)
+        self.direct_irradiance = create_irradiance_target(context, size)
+        self.indirect_irradiance = create_irradiance_target(context, size)
+        self.radiance = create_irradiance_target(context, size)
+        self.display = create_display_target(context, size)
+
+        self._lights: moderngl.Buffer | None = None
+        self._faces = context.buffer(reserve=max(1, face_count) * FACE_DTYPE.itemsize)
+        self._geometry = GeometryPass(context, scene)
+        self._reflective_shadow_map = ReflectiveShadowMapPass(context, scene)
+        self.virtual_point_lights = VirtualPointLightsPass(context, self.rsm, vpl_count)
+        self._direct_light = DirectLightPass(context, rsm_resolution)
+        self._vpl_gather = VplGatherPass(context)
+        self._material_resolve = MaterialResolvePass(context)
+        self._tone_mapping = ToneMappingPass(context)
+
+    def draw(
+        self,
+        view: View,
+        records: LightRecords,
+        parameters: ArtistParameters,
+        table_rotation: tuple[float, float] = (0.0, 0.0),
+    ) -> None:
+        """Draw `view` up to the irradiance buffers."""
+        camera = self._camera(view)
+        self._bind_lights(records)
+        self._geometry.draw(camera, self.gbuffer)
+        self._reflective_shadow_map.draw(self.rsm)
+        self.virtual_point_lights.draw(
+            self.rsm, records.moment_origin, parameters.density_exponent, table_rotation
+        )
+        self._direct_light.draw(camera, self.gbuffer, self.rsm, len(view.lights), self.direct_irradiance)
+        self._vpl_gather.draw(
+            camera, self.gbuffer, self.virtual_point_lights.count, parameters, self.indirect_irradiance
+        )
+
+    def resolve(self, share: tuple[float, float], exposure: float | None) -> None:
+        """From the irradiance buffers to radiance and the display picture.
+
+        `share` weighs direct and indirect light; `exposure` None measures it from the picture.
+        """
+        self._material_resolve.draw(
+            self.gbuffer, self.direct_irradiance, self.indirect_irradiance, share, self.radiance
+        )
+        self.tone_map(exposure)
+
+    def tone_map(self, exposure: float | None) -> None:
+        """From radiance to the display picture."""
+        self._tone_mapping.draw(self.radiance, exposure, self.display)
+
+    def _camera(self, view: View) -> CameraUniforms:
+        _, radius = self._scene.bounding_sphere()
+        return camera_uniforms(view.camera, self.size, radius)
+
+    def _bind_lights(self, records: LightRecords) -> None:
+        size = max(1, len(records.lights)) * LIGHT_DTYPE.itemsize
+        if self._lights is None or self._lights.size < size:
+            self._lights = self._context.buffer(reserve=size)
+        if len(records.lights):
+            self._lights.write(np.ascontiguousarray(records.lights).tobytes())
+        if len(records.faces):
+            self._faces.write(np.ascontiguousarray(records.faces).tobytes())
+        self._lights.bind_to_storage_buffer(buffer_bindings.LIGHTS)
+        self._faces.bind_to_storage_buffer(buffer_bindings.RSM_FACES)
+
+
+def frame_light_records(scene: SceneBuffers, view: View) -> LightRecords:
+    """The view's lights as records for the scene as it stands."""
+    return light_records(view.lights, *scene.bounding_sphere())

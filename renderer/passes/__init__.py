@@ -1,0 +1,1 @@
+"""One technique, one file, shaders of the same name; passes never import each other."""

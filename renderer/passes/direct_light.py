@@ -1,0 +1,32 @@
+"""Direct light of the punctual lights, with shadows from their RSMs."""
+
+import moderngl
+
+from renderer import buffer_bindings
+from renderer.camera_uniforms import CameraUniforms
+from renderer.render_targets import GBuffer, ReflectiveShadowMap
+from renderer.shader_library import load_compute, set_uniforms
+
+
+class DirectLightPass:
+    """G-buffer, RSM → direct irradiance."""
+
+    def __init__(self, context: moderngl.Context, rsm_resolution: int):
+        self._context = context
+        defines = {**buffer_bindings.DEFINES, "RSM_RESOLUTION": rsm_resolution}
+        self._program = load_compute(context, "direct_light", defines)
+
+    def draw(
+        self,
+        camera: CameraUniforms,
+        gbuffer: GBuffer,
+        rsm: ReflectiveShadowMap,
+        light_count: int,
+        direct_irradiance: moderngl.Texture,
+    ) -> None:
+        camera.bind_gbuffer(self._program, gbuffer, 0)
+        rsm.bind(self._program, 2)
+        set_uniforms(self._program, light_count=light_count)
+        direct_irradiance.bind_to_image(0, read=False, write=True)
+        self._program.run(-(-direct_irradiance.width // 8), -(-direct_irradiance.height // 8))
+        self._context.memory_barrier(self._context.TEXTURE_FETCH_BARRIER_BIT)

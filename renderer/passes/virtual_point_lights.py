@@ -1,0 +1,77 @@
+"""Virtual point lights drawn from the RSM on the GPU: density over texels, then a warped point table."""
+
+import moderngl
+
+from renderer import buffer_bindings
+from renderer.point_table import r2_sequence
+from renderer.render_targets import ReflectiveShadowMap
+from renderer.shader_library import load_compute, set_uniforms
+
+ROW_GROUP_SIZE = 256
+VPL_BYTES = 48
+FRAME_STATISTICS_BYTES = 16
+_ROW_MOMENTS_BYTES = 32
+
+
+class VirtualPointLightsPass:
+    """RSM atlas → `count` VPLs and the frame's statistics (total flux, scene length L)."""
+
+    def __init__(self, context: moderngl.Context, rsm: ReflectiveShadowMap, count: int):
+        self._context = context
+        self.count = count
+        defines = {
+            **buffer_bindings.DEFINES,
+            "RSM_RESOLUTION": rsm.resolution,
+            "ROW_GROUP_SIZE": ROW_GROUP_SIZE,
+        }
+        self._row_density = load_compute(context, "vpl_row_density", defines)
+        self._marginal_density = load_compute(context, "vpl_marginal_density", defines)
+        self._placement = load_compute(context, "virtual_point_lights", defines)
+        columns, rows = rsm.depth.size
+        self._buffers = {
+            buffer_bindings.POINT_TABLE: context.buffer(r2_sequence(count).tobytes()),
+            buffer_bindings.ROW_CDF: context.buffer(reserve=rows * columns * 4),
+            buffer_bindings.ROW_MOMENTS: context.buffer(reserve=rows * _ROW_MOMENTS_BYTES),
+            buffer_bindings.MARGINAL_CDF: context.buffer(reserve=rows * 4),
+        }
+        self.frame_statistics = context.buffer(reserve=FRAME_STATISTICS_BYTES)
+        self.virtual_point_lights = context.buffer(reserve=count * VPL_BYTES)
+
+    def draw(
+        self,
+        rsm: ReflectiveShadowMap,
+        moment_origin: tuple[float, float, float],
+        density_exponent: float,
+        table_rotation: tuple[float, float],
+    ) -> None:
+        """Place the VPLs.
+
+        `density_exponent` γ: chance ∝ luminance(flux)^γ over lit texels. `table_rotation` shifts the
+        point table on its torus, in [0, 1)².
+        """
+        for binding, buffer in self._buffers.items():
+            buffer.bind_to_storage_buffer(binding)
+        self.bind()
+        context = self._context
+        rsm.bind(self._row_density, 0)
+        set_uniforms(self._row_density, density_exponent=density_exponent, moment_origin=moment_origin)
+        self._row_density.run(rsm.rows)
+        context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT)
+        set_uniforms(self._marginal_density, rows=rsm.rows)
+        self._marginal_density.run(1)
+        context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT)
+        rsm.bind(self._placement, 0)
+        set_uniforms(
+            self._placement,
+            vpl_count=self.count,
+            rows=rsm.rows,
+            density_exponent=density_exponent,
+            table_rotation=table_rotation,
+        )
+        self._placement.run(-(-self.count // 64))
+        context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT)
+
+    def bind(self) -> None:
+        """Bind what the gather reads."""
+        self.frame_statistics.bind_to_storage_buffer(buffer_bindings.FRAME_STATISTICS)
+        self.virtual_point_lights.bind_to_storage_buffer(buffer_bindings.VIRTUAL_POINT_LIGHTS)

@@ -1,0 +1,125 @@
+"""The runtime: a scene and a tuned config in, pictures out."""
+
+from pathlib import Path
+from typing import Literal, get_args
+
+import moderngl
+import numpy as np
+
+from renderer.artist_parameters import ArtistParameters
+from renderer.capture import CapturedFrame, capture_frame, read_picture
+from renderer.frame import Frame, frame_light_records
+from renderer.gpu_context import check_errors, create_context
+from renderer.light_faces import NEAR_PLANE
+from renderer.scene import Scene
+from renderer.scene_buffers import SceneBuffers
+from renderer.tuned_config import TunedConfig, read_config
+from renderer.views import View
+
+Layer = Literal["final", "direct", "indirect", "irradiance", "albedo", "normal", "depth"]
+LAYERS: tuple[Layer, ...] = get_args(Layer)
+
+RSM_RESOLUTION = 512
+"""Texels along the side of an RSM face: shadows come from the same map, which sets the number."""
+
+_SHARES = {"direct": (1.0, 0.0), "indirect": (0.0, 1.0)}
+
+
+class Runtime:
+    """Draws a scene with direct light and one bounce of VPL light, on the GPU alone.
+
+    Example:
+        >>> runtime = Runtime(read_scene(path), "default")
+        >>> picture = runtime.render(view)  # [height, width, 3], uint8, sRGB
+
+    Raises:
+        InputError: the config cannot be read.
+        MachineError: no OpenGL 4.5.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        config: TunedConfig | str | Path = "default",
+        *,
+        rsm_resolution: int = RSM_RESOLUTION,
+        context: moderngl.Context | None = None,
+    ):
+        loaded = config if isinstance(config, TunedConfig) else read_config(config)
+        self.parameters: ArtistParameters = loaded.parameters
+        self._context = create_context() if context is None else context
+        self._rsm_resolution = rsm_resolution
+        self.scene_buffers = SceneBuffers(self._context, scene)
+        self._frames: dict[tuple[tuple[int, int], int, int], Frame] = {}
+
+    def render(self, view: View, layer: Layer = "final", exposure: float | None = None) -> np.ndarray:
+        """Draw one layer of a view, row 0 at the top.
+
+        `final` is [height, width, 3] uint8, sRGB, after exposure (None: measured) and tone curve. The
+        others are linear float32: `direct` and `indirect` radiance and their sum before the tone curve
+        (see `render_radiance`), `irradiance` the indirect irradiance [W/m²], `albedo` in [0, 1],
+        `normal` in world space, `depth` [height, width] along the view axis in world units (0: nothing).
+
+        Raises:
+            MachineError: the GPU ran out of memory or reported an error.
+        """
+        if layer in ("irradiance", "albedo", "normal", "depth"):
+            captured = self.capture(view)
+            return {
+                "irradiance": captured.indirect_irradiance,
+                "albedo": captured.albedo,
+                "normal": captured.normal_world * captured.valid[..., None],
+                "depth": captured.depth,
+            }[layer]
+        frame = self._draw(view)
+        frame.resolve(_SHARES.get(layer, (1.0, 1.0)), exposure)
+        picture = read_picture(frame.display if layer == "final" else frame.radiance)[..., :3]
+        check_errors(self._context, f"layer {layer} of view {view.name}")
+        return np.ascontiguousarray(picture)
+
+    def render_radiance(self, view: View) -> np.ndarray:
+        """Direct plus indirect radiance, [height, width, 3] float32, linear, without a tone curve."""
+        frame = self._draw(view)
+        frame.resolve((1.0, 1.0), 1.0)
+        return np.ascontiguousarray(read_picture(frame.radiance)[..., :3])
+
+    def display(self, radiance: np.ndarray, exposure: float | None = None) -> np.ndarray:
+        """Any radiance picture, [height, width, 3 or 4], through this runtime's exposure and tone curve.
+
+        Returns [height, width, 3] uint8, sRGB. References are shown the same way as our own pictures.
+        """
+        frame = self._frame((radiance.shape[1], radiance.shape[0]), 1)
+        pixels = np.ones((*radiance.shape[:2], 4), np.float32)
+        pixels[..., : radiance.shape[2]] = radiance
+        frame.radiance.write(np.ascontiguousarray(pixels[::-1]).tobytes())
+        frame.tone_map(exposure)
+        return np.ascontiguousarray(read_picture(frame.display)[..., :3])
+
+    def capture(self, view: View, table_rotation: tuple[float, float] = (0.0, 0.0)) -> CapturedFrame:
+        """Draw a view and read back the buffers that the gather reads and makes.
+
+        `table_rotation` in [0, 1)² shifts the VPL point table on its torus: another, equally good
+        placement of the VPLs.
+        """
+        frame = self._draw(view, table_rotation)
+        _, radius = self.scene_buffers.bounding_sphere()
+        captured = capture_frame(frame, view, NEAR_PLANE * radius)
+        check_errors(self._context, f"the buffers of view {view.name}")
+        return captured
+
+    def _draw(self, view: View, table_rotation: tuple[float, float] = (0.0, 0.0)) -> Frame:
+        records = frame_light_records(self.scene_buffers, view)
+        frame = self._frame(view.size, len(records.faces))
+        frame.draw(view, records, self.parameters, table_rotation)
+        return frame
+
+    def _frame(self, size: tuple[int, int], face_count: int) -> Frame:
+        key = (size, face_count, self.parameters.vpl_count)
+        if key not in self._frames:
+            # One frame's targets at a time: pictures of many sizes must not add up in GPU memory.
+            self._frames.clear()
+            self._context.gc()
+            self._frames[key] = Frame(
+                self._context, self.scene_buffers, size, self._rsm_resolution, face_count, key[2]
+            )
+        return self._frames[key]

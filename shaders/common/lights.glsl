@@ -1,0 +1,65 @@
+// Punctual lights and the faces of their reflective shadow maps (RSM).
+
+#define LIGHT_SPOT 0
+#define LIGHT_POINT 1
+#define LIGHT_DIRECTIONAL 2
+
+const float PI = 3.14159265358979;
+
+struct Light {
+    vec4 position_kind;         // world position, kind
+    vec4 direction_cone_scale;  // unit direction of travel; spot: 1 / (cos inner - cos outer)
+    vec4 intensity_cos_outer; // W/sr (directional: W/m² across the beam); spot: cos outer
+    ivec4 faces;                // first face, number of faces
+};
+
+// One square view of a light. A perspective face covers |x|, |y| <= extent at unit depth; an orthographic
+// one covers |x|, |y| <= extent in world units and depths in [0, range].
+struct RsmFace {
+    mat4 light_to_world;  // rigid; looks along -Z
+    int light;
+    int orthographic;
+    float extent;
+    float near_or_range;  // perspective: near plane; orthographic: range
+};
+
+layout(std430, binding = LIGHTS_BINDING) readonly buffer Lights {
+    Light lights[];
+};
+
+layout(std430, binding = RSM_FACES_BINDING) readonly buffer RsmFaces {
+    RsmFace rsm_faces[];
+};
+
+// KHR_lights_punctual, "Inner and Outer Cone Angles".
+float cone_falloff(Light light, vec3 direction_from_light) {
+    if (int(light.position_kind.w) != LIGHT_SPOT) {
+        return 1.0;
+    }
+    float cosine = dot(direction_from_light, light.direction_cone_scale.xyz);
+    float ramp = clamp((cosine - light.intensity_cos_outer.w) * light.direction_cone_scale.w, 0.0, 1.0);
+    return ramp * ramp;
+}
+
+// Unit vector from a point towards the light.
+vec3 towards_light(Light light, vec3 position_world) {
+    if (int(light.position_kind.w) == LIGHT_DIRECTIONAL) {
+        return -light.direction_cone_scale.xyz;
+    }
+    return normalize(light.position_kind.xyz - position_world);
+}
+
+// Irradiance [W/m²] on a surface square to the light, without shadow.
+vec3 irradiance_facing(Light light, vec3 position_world) {
+    if (int(light.position_kind.w) == LIGHT_DIRECTIONAL) {
+        return light.intensity_cos_outer.rgb;
+    }
+    vec3 from_light = position_world - light.position_kind.xyz;
+    float distance_squared = max(dot(from_light, from_light), 1e-30);
+    return light.intensity_cos_outer.rgb * cone_falloff(light, from_light * inversesqrt(distance_squared))
+         / distance_squared;
+}
+
+vec3 world_to_face(RsmFace face, vec3 position_world) {
+    return transpose(mat3(face.light_to_world)) * (position_world - face.light_to_world[3].xyz);
+}

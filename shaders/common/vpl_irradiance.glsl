@@ -1,0 +1,23 @@
+// Irradiance from one VPL. Twin: tuner/vpl_gather.py `vpl_irradiance`.
+// Keller 1997 (instant radiosity), with the point spread over its footprint: 1/d² becomes 1/(d² + (αl)²),
+// which for α = 1 is the exact form factor of a coaxial disc.
+
+struct FalloffParameters {
+    float intensity;             // k
+    float falloff_footprint;     // α
+    float falloff_transmittance; // κ
+};
+
+vec3 vpl_irradiance(
+    vec3 position_world, vec3 normal_world, VirtualPointLight vpl, float scene_length, FalloffParameters parameters
+) {
+    vec3 to_vpl = vpl.position_footprint.xyz - position_world;
+    // 1e-30 keeps the quotient finite where receiver and VPL coincide; both cosines are 0 there.
+    float distance_squared = max(dot(to_vpl, to_vpl), 1e-30);
+    float cosine_receiver = max(dot(normal_world, to_vpl), 0.0);
+    float cosine_vpl = max(-dot(vpl.normal_area.xyz, to_vpl), 0.0);
+    float footprint = parameters.falloff_footprint * vpl.position_footprint.w;
+    float form = cosine_receiver * cosine_vpl / distance_squared / (distance_squared + footprint * footprint);
+    float transmittance = exp(-parameters.falloff_transmittance * sqrt(distance_squared) / scene_length);
+    return vpl.flux.rgb * (parameters.intensity / PI * form * transmittance);
+}

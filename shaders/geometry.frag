@@ -1,0 +1,14 @@
+// G-buffer: shading normal (octahedral) and albedo; position comes back from depth.
+#include "common/octahedral.glsl"
+#include "common/surface.glsl"
+
+uniform vec3 eye_world;
+
+layout(location = 0) out vec2 out_normal;
+layout(location = 1) out vec4 out_albedo;
+
+void main() {
+    vec3 to_eye = eye_world - position_world;
+    out_normal = octahedral_encode(shading_normal(to_eye, geometric_normal(to_eye)));
+    out_albedo = vec4(surface_albedo(), 1.0);
+}

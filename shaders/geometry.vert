@@ -1,0 +1,22 @@
+// G-buffer: the camera's view of the scene.
+#include "common/scene_vertex.glsl"
+
+uniform mat4 world_to_camera;
+uniform vec2 tan_half_fov;
+uniform float near_plane;
+
+out vec3 position_world;
+out vec3 normal_world;
+out vec2 uv;
+out vec3 base_color;
+
+void main() {
+    SceneVertex vertex = scene_vertex();
+    position_world = vertex.position_world;
+    normal_world = vertex.normal_world;
+    base_color = vertex.base_color;
+    uv = in_uv;
+    vec3 position_camera = (world_to_camera * vec4(position_world, 1.0)).xyz;
+    // Reversed depth without a far plane: depth = near / distance along the axis.
+    gl_Position = vec4(position_camera.xy / tan_half_fov, near_plane, -position_camera.z);
+}

@@ -27,10 +27,10 @@ class ParameterSpec:
     name: str
     symbol: str
     """As written in ARCHITECTURE.md and in the literature."""
-    default: float
-    low: float
+    default: float | int
+    low: float | int
     """Smallest allowed value, itself allowed."""
-    high: float
+    high: float | int
     """Largest allowed value, itself allowed."""
     scale: Scale
     """The scale on which a slider or an optimiser takes equal steps."""

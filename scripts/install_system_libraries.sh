@@ -26,6 +26,7 @@ ldconfig=$(command -v ldconfig || echo /sbin/ldconfig)
 # moderngl, glcontext and flip-evaluator have no wheels for other processors; pip compiles them.
 if [ "$(uname -m)" != x86_64 ]; then
     command -v g++ >/dev/null || missing="$missing g++"
+    [ -e /usr/include/X11/Xlib.h ] || missing="$missing libx11-dev"
     "$PYTHON" -c 'import os, sys, sysconfig
 sys.exit(not os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h")))' ||
         missing="$missing python3-dev"

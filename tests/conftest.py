@@ -1,0 +1,42 @@
+"""Every shape annotation of ours is checked while tests run; scenes and corpora are found here."""
+
+import os
+from pathlib import Path
+
+import jaxtyping
+import numpy as np
+import pytest
+
+# Before any test module imports them: the hook works at import.
+jaxtyping.install_import_hook(["renderer", "tuner"], "beartype.beartype")
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(autouse=True)
+def floating_point_errors_raise():
+    """A division by zero, an overflow or an invalid operation in a test is an error.
+
+    Underflow is not: radiance far from a light rightly fades to zero.
+    """
+    with np.errstate(divide="raise", over="raise", invalid="raise"):
+        yield
+
+
+@pytest.fixture(scope="session")
+def scenes_folder() -> Path:
+    """Scenes that others made, which are not in the repository."""
+    return _outside_folder("VPLTUNE_SCENES", "scenes")
+
+
+@pytest.fixture(scope="session")
+def corpora_folder() -> Path:
+    """Hostile, odd and valid scene files, which are not in the repository."""
+    return _outside_folder("VPLTUNE_CORPORA", "corpora")
+
+
+def _outside_folder(variable: str, name: str) -> Path:
+    folder = Path(os.environ.get(variable) or REPOSITORY.parent / "shared" / name)
+    if not folder.is_dir():
+        pytest.skip(f"no folder {folder}; set {variable} to the folder of {name}")
+    return folder

@@ -1,0 +1,1 @@
+"""The tuner: fits the runtime's parameters to a path tracer, by gradient descent."""

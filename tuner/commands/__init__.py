@@ -1,0 +1,1 @@
+"""The commands of `vpltune`: each parses, calls the library and prints."""

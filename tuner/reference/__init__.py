@@ -1,0 +1,23 @@
+"""The reference: what one bounce of indirect light really is, path-traced with Mitsuba."""
+
+from tuner.reference.reference_view import ReferenceView, noise_floor
+from tuner.reference.reference_views import reference_views
+from tuner.reference.variant import MitsubaVariant, describe_variant
+
+__all__ = [
+    "MitsubaVariant",
+    "ReferenceView",
+    "describe_variant",
+    "noise_floor",
+    "ray_traced_visibility",
+    "reference_views",
+]
+
+
+def __getattr__(name: str):
+    # `visibility` loads Mitsuba, which the names above do not.
+    if name == "ray_traced_visibility":
+        from tuner.reference.visibility import ray_traced_visibility
+
+        return ray_traced_visibility
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

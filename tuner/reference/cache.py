@@ -1,0 +1,102 @@
+"""References kept in the user's cache folder, found again by what they were made from."""
+
+import contextlib
+import fcntl
+import hashlib
+import io
+import logging
+import os
+from collections.abc import Iterator
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import platformdirs
+
+from renderer.atomic_file import written_whole
+from renderer.errors import InputError
+from tuner.reference.reference_view import ReferenceView
+
+SIZE_LIMIT = 2 * 2**30
+"""Bytes kept; beyond them, the entries that were not used for longest go."""
+
+_DIGEST_BYTES = 32
+_log = logging.getLogger(__name__)
+
+
+def cache_folder() -> Path:
+    """The folder named by the environment variable VPLTUNE_CACHE, else the user's own for this program."""
+    named = os.environ.get("VPLTUNE_CACHE")
+    return Path(named) if named else Path(platformdirs.user_cache_dir("vpltune", appauthor=False))
+
+
+def load(key: str) -> ReferenceView | None:
+    """The entry of `key`, or None where there is none or it is not what was written."""
+    path = _path(key)
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return None
+    payload = data[_DIGEST_BYTES:]
+    if hashlib.sha256(payload).digest() != data[:_DIGEST_BYTES]:
+        _log.warning("%s: damaged, made again", path)
+        return None
+    with contextlib.suppress(OSError):
+        os.utime(path)
+    with np.load(io.BytesIO(payload), allow_pickle=False) as arrays:
+        return ReferenceView(**{name: arrays[name][()] for name in arrays.files})
+
+
+def store(key: str, reference: ReferenceView) -> None:
+    """Keep `reference` under `key`, whole or not at all; a folder that cannot be written to is no error."""
+    arrays = {field.name: np.asarray(getattr(reference, field.name)) for field in fields(reference)}
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    payload = buffer.getvalue()
+    try:
+        with written_whole(_path(key)) as temporary:
+            temporary.write_bytes(hashlib.sha256(payload).digest() + payload)
+        _drop_oldest()
+    except (OSError, InputError) as error:
+        _log.warning("references are not kept: %s", error)
+
+
+@contextlib.contextmanager
+def locked(key: str) -> Iterator[None]:
+    """Hold `key` alone among processes, so that none makes what another is making.
+
+    The lock is the kernel's own and ends with its process, however that ends.
+    """
+    path = _path(key).with_suffix(".lock")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    except OSError:
+        yield
+        return
+    try:
+        with contextlib.suppress(OSError):  # some network file systems cannot lock
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        # Unlinked while held: whoever waits on it finds the entry made, and no lock files pile up.
+        path.unlink(missing_ok=True)
+        os.close(handle)
+
+
+def _path(key: str) -> Path:
+    return cache_folder() / "references" / f"{key}.npz.sha256"
+
+
+def _drop_oldest() -> None:
+    entries = []
+    for path in (cache_folder() / "references").glob("*.npz.sha256"):
+        with contextlib.suppress(OSError):
+            status = path.stat()
+            entries.append((status.st_mtime, status.st_size, path))
+    total = sum(size for _, size, _ in entries)
+    for _, size, path in sorted(entries, key=lambda entry: entry[0]):
+        if total <= SIZE_LIMIT:
+            return
+        path.unlink(missing_ok=True)
+        total -= size

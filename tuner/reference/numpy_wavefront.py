@@ -1,0 +1,113 @@
+"""The methods of `LlvmWavefront` in numpy, for machines where Mitsuba has no usable LLVM.
+
+Rays are cast one by one by Mitsuba's scalar variant; all other arithmetic is whole arrays at a time.
+Vectors are [3, lanes].
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import drjit.scalar
+import mitsuba as mi
+import numpy as np
+
+from tuner.reference.llvm_wavefront import mitsuba_scene
+from tuner.reference.unit_triangles import UnitTriangles
+
+
+class NumpyWavefront:
+    """Rays against one scene's triangles, many lanes at once; see `LlvmWavefront`."""
+
+    def __init__(self, triangles: UnitTriangles):
+        self._scene = mitsuba_scene(triangles, drjit.scalar.ArrayXf, drjit.scalar.ArrayXu)
+
+    def table(self, values):
+        return np.ascontiguousarray(values).ravel()
+
+    def vectors(self, values):
+        return np.ascontiguousarray(values.T, dtype=np.float32)
+
+    def take(self, table, index):
+        return table[index]
+
+    def take_vector(self, table, index):
+        return np.ascontiguousarray(table.reshape(-1, 3)[index].T)
+
+    def loop(self, condition: Callable[..., Any], body: Callable[..., tuple], state: tuple) -> tuple:
+        while True:
+            going = condition(*state)
+            if not np.any(going):
+                return state
+            # Lanes that are done keep their state, as in a Dr.Jit loop.
+            state = tuple(np.where(going, new, old) for new, old in zip(body(*state), state, strict=True))
+
+    def closest_hit(self, origin, direction, active):
+        lanes = direction.shape[1]
+        hit = np.zeros(lanes, bool)
+        triangle = np.zeros(lanes, np.uint32)
+        b1, b2 = np.zeros((2, lanes), np.float32)
+        for lane, ray in self._rays(origin, direction, active):
+            found = self._scene.ray_intersect_preliminary(ray, coherent=False, active=True)
+            if found.is_valid():
+                hit[lane] = True
+                triangle[lane] = found.prim_index
+                b1[lane], b2[lane] = found.prim_uv
+        return hit, triangle, b1, b2
+
+    def occluded(self, origin, direction, max_t, active):
+        blocked = np.zeros(direction.shape[1], bool)
+        limits = np.broadcast_to(max_t, blocked.shape)
+        for lane, ray in self._rays(origin, direction, active):
+            ray.maxt = float(limits[lane])
+            blocked[lane] = self._scene.ray_test(ray, coherent=False, active=True)
+        return blocked
+
+    def _rays(self, origin, direction, active):
+        lanes = np.flatnonzero(np.broadcast_to(active, direction.shape[1:]))
+        origins = np.broadcast_to(origin, direction.shape)[:, lanes].T.tolist()
+        directions = direction[:, lanes].T.tolist()
+        for lane, start, way in zip(lanes.tolist(), origins, directions, strict=True):
+            yield lane, mi.Ray3f(start, way)
+
+    def lanes(self, count):
+        return np.arange(count, dtype=np.uint32)
+
+    def all_true(self, count):
+        return np.ones(count, bool)
+
+    def zero_vectors(self, count):
+        return np.zeros((3, count), np.float32)
+
+    def vector(self, x, y, z):
+        return np.stack(np.broadcast_arrays(x, y, z))
+
+    def to_index(self, number):
+        return np.asarray(number).astype(np.uint32)
+
+    def to_number(self, index):
+        return np.asarray(index).astype(np.float32)
+
+    def to_numpy(self, array):
+        return np.asarray(array).T
+
+    def evaluate(self, *arrays):
+        pass
+
+    def run(self, work):
+        # Lanes that are masked out may divide by zero, as they may in a kernel.
+        with np.errstate(all="ignore"):
+            return work()
+
+    def where(self, condition, chosen, otherwise):
+        values = np.where(condition, chosen, otherwise)
+        return values.astype(np.float32) if values.dtype == np.float64 else values
+
+    def dot(self, a, b):
+        return np.sum(a * b, axis=0, dtype=np.float32)
+
+    minimum = staticmethod(np.minimum)
+    maximum = staticmethod(np.maximum)
+    sqrt = staticmethod(np.sqrt)
+    floor = staticmethod(np.floor)
+    sin = staticmethod(np.sin)
+    cos = staticmethod(np.cos)

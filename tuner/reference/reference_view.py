@@ -1,0 +1,47 @@
+"""The reference of one view, and how much noise is left in it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float32, Float64
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceView:
+    """Irradiance in W/m² at the centres of a view's pixels, row 0 at the top.
+
+    Pictures are zero where a pixel sees no surface. Positions and lengths are in world units.
+    """
+
+    irradiance_a: Float32[np.ndarray, "height width 3"]
+    """Indirect irradiance. The two halves are independent estimates, each without bias."""
+    irradiance_b: Float32[np.ndarray, "height width 3"]
+    direct_irradiance: Float32[np.ndarray, "height width 3"]
+    """Exact: punctual lights and their shadows have no noise."""
+    albedo: Float32[np.ndarray, "height width 3"]
+    position_world: Float64[np.ndarray, "height width 3"]
+    normal_world: Float32[np.ndarray, "height width 3"]
+    """Shading normals, turned towards the eye."""
+    valid: Bool[np.ndarray, "height width"]
+    """Whether a pixel's centre sees a surface."""
+    samples: int
+    """Samples per pixel in each half."""
+
+    @property
+    def irradiance(self) -> Float32[np.ndarray, "height width 3"]:
+        """Indirect irradiance, the mean of both halves."""
+        return (self.irradiance_a + self.irradiance_b) / np.float32(2.0)
+
+
+def noise_floor(reference: ReferenceView) -> float:
+    """What noise alone adds to a relMSE against this reference; 0 where no pixel is valid or lit.
+
+    relMSE is mean((y − r)²/(r² + 0.01·mean(r)²)) over valid pixels and channels. With r = (A + B)/2 and
+    independent halves, ((A − B)/2)² has the variance of r as its expectation and takes the place of (y − r)².
+    """
+    a = reference.irradiance_a[reference.valid].astype(np.float64)
+    b = reference.irradiance_b[reference.valid].astype(np.float64)
+    mean = (a + b) / 2.0
+    if not mean.any():
+        return 0.0
+    return float(np.mean(((a - b) / 2.0) ** 2 / (mean**2 + 0.01 * mean.mean() ** 2)))

@@ -1,0 +1,120 @@
+"""References of views: from the cache, else rendered until their noise is low enough."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from renderer.scene import Scene
+from renderer.views import View
+from tuner.reference import cache
+from tuner.reference.content_key import reference_key, scene_digest
+from tuner.reference.reference_view import ReferenceView, noise_floor
+from tuner.reference.variant import describe_variant
+
+FIRST_ROUND = 64
+"""Samples per half before the noise is first looked at; each later round doubles what there is."""
+
+Progress = Callable[[str, float], None]
+
+
+def reference_views(
+    scene: Scene,
+    views: tuple[View, ...],
+    *,
+    seed: int = 0,
+    noise_target: float = 1e-3,
+    max_samples: int = 4096,
+    bounces: int | None = 1,
+    progress: Progress | None = None,
+) -> tuple[ReferenceView, ...]:
+    """The reference of each view, bit for bit the same for the same arguments, variant and versions.
+
+    Args:
+        scene: Geometry and materials; its own lights and cameras are not looked at, the views' are.
+        views: What to render.
+        seed: Of both halves' randomisation; at least 0.
+        noise_target: Sampling stops once `noise_floor` is at most this …
+        max_samples: … or a half has this many samples per pixel; at least 1.
+        bounces: Reflections before light arrives at a receiver: 1, more, or None for all.
+        progress: Called with the view's name and the share of all work that is done, in [0, 1].
+
+    Raises:
+        InputError: the scene has no triangles, or an index in it is out of range.
+        ValueError: an argument is out of its range.
+    """
+    if max_samples < 1 or not noise_target >= 0.0 or (bounces is not None and bounces < 1) or seed < 0:
+        raise ValueError(
+            "reference_views: max_samples and bounces must be at least 1, noise_target and seed at least 0, "
+            f"got {max_samples}, {bounces}, {noise_target} and {seed}"
+        )
+    scene_hash = scene_digest(scene)
+    variant = describe_variant().name
+    references = []
+    for index, view in enumerate(views):
+
+        def report(share: float, view: View = view, index: int = index) -> None:
+            if progress is not None:
+                progress(view.name, (index + share) / len(views))
+
+        report(0.0)
+        key = reference_key(
+            scene_hash,
+            view,
+            seed=seed,
+            noise_target=noise_target,
+            max_samples=max_samples,
+            bounces=bounces,
+            variant=variant,
+        )
+        reference = cache.load(key)
+        if reference is None:
+            with cache.locked(key):
+                reference = cache.load(key)
+                if reference is None:
+                    reference = _rendered(scene, view, seed, noise_target, max_samples, bounces, report)
+                    cache.store(key, reference)
+        references.append(reference)
+        report(1.0)
+    return tuple(references)
+
+
+def _rendered(
+    scene: Scene,
+    view: View,
+    seed: int,
+    noise_target: float,
+    max_samples: int,
+    bounces: int | None,
+    report: Callable[[float], None],
+) -> ReferenceView:
+    # Here, so that a run whose references are all kept does not load Mitsuba.
+    from tuner.reference.indirect_irradiance import IndirectIrradiance
+    from tuner.reference.traced_scene import traced_scene
+
+    traced = traced_scene(scene)
+    estimator = IndirectIrradiance(traced.wavefront, traced.surfaces, traced.triangles, view)
+    hits = estimator.primary_hits
+    total = np.zeros((2, *hits.albedo.shape))
+    done, goal, needed = 0, min(FIRST_ROUND, max_samples), max_samples
+    while True:
+        for taken, batch in estimator.batches(done, goal - done, seed, bounces):
+            total += batch
+            done += taken
+            report(min(1.0, done / needed))
+        half_a, half_b = (total / done).astype(np.float32)
+        reference = ReferenceView(
+            irradiance_a=half_a,
+            irradiance_b=half_b,
+            direct_irradiance=hits.direct_irradiance,
+            albedo=hits.albedo,
+            position_world=hits.position_world,
+            normal_world=hits.normal_world,
+            valid=hits.valid,
+            samples=done,
+        )
+        floor = noise_floor(reference)
+        if floor <= noise_target or done >= max_samples:
+            return reference
+        # Variance falls at least as fast as 1/samples.
+        needed = max_samples if noise_target == 0.0 else min(max_samples, done * floor / noise_target)
+        goal = min(2 * done, max_samples)

@@ -1,0 +1,41 @@
+"""A scene ready for rays: the chosen Mitsuba variant, its acceleration structure, and surfaces to shade."""
+
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+from renderer.scene import Scene
+from tuner.reference.surfaces import Surfaces
+from tuner.reference.unit_triangles import UnitTriangles, unit_triangles
+from tuner.reference.variant import select_variant
+
+
+@dataclass(frozen=True, eq=False)
+class TracedScene:
+    """One scene on one wavefront."""
+
+    triangles: UnitTriangles
+    wavefront: Any
+    """`LlvmWavefront` or `NumpyWavefront`, which have the same methods."""
+    surfaces: Surfaces
+
+
+def traced_scene(scene: Scene) -> TracedScene:
+    """Build what rays need; the last scene asked for is kept.
+
+    Raises:
+        InputError: the scene has no triangles, or an index in it is out of range.
+    """
+    return _traced_scene(scene, select_variant().name)
+
+
+@functools.lru_cache(maxsize=1)
+def _traced_scene(scene: Scene, variant: str) -> TracedScene:
+    # Dr.Jit's array types differ by variant: each module is loaded only where its own is current.
+    if variant == "scalar_rgb":
+        from tuner.reference.numpy_wavefront import NumpyWavefront as Wavefront
+    else:
+        from tuner.reference.llvm_wavefront import LlvmWavefront as Wavefront
+    triangles = unit_triangles(scene)
+    wavefront = Wavefront(triangles)
+    return TracedScene(triangles, wavefront, Surfaces(wavefront, triangles))

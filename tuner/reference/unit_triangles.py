@@ -1,0 +1,160 @@
+"""A scene as one list of triangles in unit space: centred, and scaled to a diagonal of one.
+
+Ray tracing needs small distances ("off this surface, but not through the next"). In unit space they
+are fixed fractions of the scene, so that a scene and the same scene a hundred times as large are
+traced alike.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Float32, Float64, Int64, UInt32
+
+from renderer.errors import InputError
+from renderer.scene import Light, Mesh, Scene, transform_normals, transform_points
+
+WRAP_MODES = ("repeat", "mirrored_repeat", "clamp_to_edge")
+
+
+@dataclass(frozen=True, eq=False)
+class UnitTriangles:
+    """All placed triangles of a scene, in unit space, and their textures packed end to end."""
+
+    center_world: Float64[np.ndarray, "3"]
+    diagonal: float
+    """World length of one unit."""
+    positions: Float32[np.ndarray, "vertices 3"]
+    normals: Float32[np.ndarray, "vertices 3"]
+    """Unit length, or zero where a node is scaled flat."""
+    uv: Float32[np.ndarray, "vertices 2"]
+    colors: Float32[np.ndarray, "vertices 3"]
+    """Vertex colour times the material's base colour."""
+    triangles: UInt32[np.ndarray, "triangles 3"]
+    geometric_normals: Float32[np.ndarray, "triangles 3"]
+    """Unit length by winding; zero for a triangle without area, which no ray hits."""
+    triangle_textures: UInt32[np.ndarray, "triangles"]
+    """Row of `textures`; row 0 is a single white texel, for materials without a texture."""
+    textures: UInt32[np.ndarray, "textures 5"]
+    """First texel, width, height, and the wrap modes along u and v as places in `WRAP_MODES`."""
+    texels: UInt32[np.ndarray, "texels"]
+    """sRGB bytes, red lowest."""
+
+    def to_unit(self, points_world: Float[np.ndarray, "*n 3"]) -> Float64[np.ndarray, "*n 3"]:
+        """Points from world to unit space."""
+        return (points_world - self.center_world) / self.diagonal
+
+    def unit_intensity(self, light: Light) -> Float64[np.ndarray, "3"]:
+        """Intensity that gives the same irradiance in unit space: W/sr shrink with the square of length."""
+        return light.intensity if light.kind == "directional" else light.intensity / self.diagonal**2
+
+
+def unit_triangles(scene: Scene) -> UnitTriangles:
+    """Place, merge and rescale a scene's triangles.
+
+    Raises:
+        InputError: no triangles; an index out of range; a position that is not finite; no extent.
+    """
+    for mesh in scene.meshes:
+        _check_mesh(scene, mesh)
+    placed = [i for i in scene.instances if len(scene.meshes[i.mesh].triangles)]
+    if not placed:
+        raise InputError(f"{scene.name}: a scene must hold at least one triangle, got none")
+    meshes = [scene.meshes[i.mesh] for i in placed]
+    points = [
+        transform_points(i.to_world, mesh.positions[np.unique(mesh.triangles)])
+        for i, mesh in zip(placed, meshes, strict=True)
+    ]
+    low = np.min([p.min(axis=0) for p in points], axis=0)
+    high = np.max([p.max(axis=0) for p in points], axis=0)
+    diagonal = float(np.linalg.norm(high - low))
+    if not (np.isfinite(diagonal) and diagonal > 0.0):
+        raise InputError(f"{scene.name}: the scene's extent must be positive and finite, got {diagonal}")
+    center = (low + high) / 2.0
+
+    first_vertex = np.cumsum([0] + [len(mesh.positions) for mesh in meshes])
+    positions = np.concatenate(
+        [
+            (transform_points(i.to_world, mesh.positions) - center) / diagonal
+            for i, mesh in zip(placed, meshes, strict=True)
+        ]
+    )
+    triangles = np.concatenate(
+        [
+            mesh.triangles.astype(np.int64) + first
+            for mesh, first in zip(meshes, first_vertex[:-1], strict=True)
+        ]
+    )
+    texture_of = [_texture_row(scene, mesh) for mesh in meshes]
+    textures, texels = _packed_textures(scene)
+    return UnitTriangles(
+        center_world=center,
+        diagonal=diagonal,
+        positions=positions.astype(np.float32),
+        normals=np.concatenate(
+            [transform_normals(i.to_world, mesh.normals) for i, mesh in zip(placed, meshes, strict=True)]
+        ).astype(np.float32),
+        uv=np.concatenate([mesh.uv for mesh in meshes]).astype(np.float32),
+        colors=np.concatenate([mesh.colors * scene.materials[mesh.material].base_color for mesh in meshes]),
+        triangles=triangles.astype(np.uint32),
+        geometric_normals=_geometric_normals(positions, triangles),
+        triangle_textures=np.repeat(texture_of, [len(mesh.triangles) for mesh in meshes]).astype(np.uint32),
+        textures=textures,
+        texels=texels,
+    )
+
+
+def _check_mesh(scene: Scene, mesh: Mesh) -> None:
+    where = f"{scene.name}: mesh '{mesh.name}'"
+    if mesh.triangles.size and not 0 <= mesh.triangles.min() <= mesh.triangles.max() < len(mesh.positions):
+        raise InputError(
+            f"{where}: vertex indices must lie in [0, {len(mesh.positions)}), "
+            f"got {mesh.triangles.min()} to {mesh.triangles.max()}"
+        )
+    if not 0 <= mesh.material < len(scene.materials):
+        raise InputError(f"{where}: material must lie in [0, {len(scene.materials)}), got {mesh.material}")
+    texture = scene.materials[mesh.material].texture
+    if texture is not None and not 0 <= texture < len(scene.textures):
+        raise InputError(f"{where}: texture must lie in [0, {len(scene.textures)}), got {texture}")
+    for attribute in ("positions", "normals", "uv", "colors"):
+        if not np.isfinite(getattr(mesh, attribute)).all():
+            raise InputError(f"{where}: {attribute} must be finite")
+
+
+def _texture_row(scene: Scene, mesh: Mesh) -> int:
+    texture = scene.materials[mesh.material].texture
+    return 0 if texture is None else texture + 1
+
+
+def _packed_textures(
+    scene: Scene,
+) -> tuple[UInt32[np.ndarray, "textures 5"], UInt32[np.ndarray, "texels"]]:
+    rows = [(0, 1, 1, 0, 0)]
+    texels = [np.array([0xFFFFFF], np.uint32)]
+    first = 1
+    for texture in scene.textures:
+        height, width, _ = texture.texels_srgb.shape
+        rows.append(
+            (first, width, height, WRAP_MODES.index(texture.wrap_u), WRAP_MODES.index(texture.wrap_v))
+        )
+        red, green, blue = texture.texels_srgb.reshape(-1, 3).T.astype(np.uint32)
+        texels.append(red | green << 8 | blue << 16)
+        first += width * height
+    if first >= 2**31:
+        raise InputError(f"{scene.name}: textures must hold fewer than 2^31 texels in all, got {first}")
+    return np.array(rows, np.uint32), np.concatenate(texels)
+
+
+def _geometric_normals(
+    positions: Float64[np.ndarray, "vertices 3"], triangles: Int64[np.ndarray, "triangles 3"]
+) -> Float32[np.ndarray, "triangles 3"]:
+    corner = positions[triangles]
+    normals = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0.0).astype(np.float32)
+
+
+def srgb_decode_table() -> Float32[np.ndarray, "256"]:
+    """Linear value of each sRGB byte (IEC 61966-2-1)."""
+    encoded = np.arange(256) / 255.0
+    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    return linear.astype(np.float32)

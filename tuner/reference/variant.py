@@ -1,0 +1,161 @@
+"""Which Mitsuba variant works on this machine.
+
+`llvm_ad_rgb` is fast, but with an LLVM library too old for the processor it aborts the whole process at its
+first kernel. So it is tried in a process of its own, with each LLVM library found here, newest first, until
+one works; else `scalar_rgb` serves, slowly. The answer is kept in the cache folder until Mitsuba or one
+of the libraries changes.
+
+Environment variables: VPLTUNE_MITSUBA_VARIANT forces `llvm_ad_rgb` or `scalar_rgb` untried;
+DRJIT_LIBLLVM_PATH names the only LLVM library to try.
+"""
+
+import contextlib
+import functools
+import hashlib
+import importlib.metadata
+import json
+import os
+import platform
+import re
+import subprocess
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Literal
+
+from renderer.atomic_file import write_text_whole
+from renderer.errors import InputError
+from tuner.reference.cache import cache_folder
+
+LIBRARIES_TRIED = 4
+PROBE_SECONDS = 60.0
+OLDEST_LLVM = 15
+"""Mitsuba 3.6 and later do not load anything older."""
+
+_PROBE = """
+import mitsuba as mi
+mi.set_variant("llvm_ad_rgb")
+sphere = {"type": "scene", "lamp": {"type": "point"}, "integrator": {"type": "path"}, "ball": {"type": "sphere"},
+          "eye": {"type": "perspective", "film": {"type": "hdrfilm", "width": 8, "height": 8}}}
+assert mi.render(mi.load_dict(sphere), spp=1).numpy().shape == (8, 8, 3)
+"""
+
+
+@dataclass(frozen=True)
+class MitsubaVariant:
+    """The variant in use, and why."""
+
+    name: Literal["llvm_ad_rgb", "scalar_rgb"]
+    libllvm: str | None
+    """The LLVM library it loads; None for the scalar variant, and where Dr.Jit finds its own."""
+    sentence: str
+
+
+def describe_variant() -> MitsubaVariant:
+    """The variant that references are made with here. Mitsuba is loaded by a process of its own, if at all.
+
+    Raises:
+        InputError: VPLTUNE_MITSUBA_VARIANT names another variant.
+    """
+    return _chosen_variant(os.environ.get("VPLTUNE_MITSUBA_VARIANT"), os.environ.get("DRJIT_LIBLLVM_PATH"))
+
+
+def select_variant() -> MitsubaVariant:
+    """Load Mitsuba and make the variant of `describe_variant` current."""
+    variant = describe_variant()
+    if variant.libllvm is not None:
+        os.environ["DRJIT_LIBLLVM_PATH"] = variant.libllvm
+    import mitsuba
+
+    if mitsuba.variant() != variant.name:
+        mitsuba.set_variant(variant.name)
+    return variant
+
+
+@functools.cache
+def _chosen_variant(forced: str | None, named_library: str | None) -> MitsubaVariant:
+    if forced == "scalar_rgb":
+        return MitsubaVariant(
+            "scalar_rgb", None, "VPLTUNE_MITSUBA_VARIANT asks for the slow scalar_rgb variant."
+        )
+    if forced == "llvm_ad_rgb":
+        return MitsubaVariant("llvm_ad_rgb", named_library, "VPLTUNE_MITSUBA_VARIANT asks for llvm_ad_rgb.")
+    if forced:
+        raise InputError(f"VPLTUNE_MITSUBA_VARIANT: must be llvm_ad_rgb or scalar_rgb, got {forced!r}")
+    # Last, whatever Dr.Jit finds by itself: on other systems it may know better.
+    libraries = [named_library] if named_library else [*map(str, llvm_libraries()[:LIBRARIES_TRIED]), None]
+    path = cache_folder() / "mitsuba_variant.json"
+    key = _machine_key(libraries)
+    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        if kept["key"] == key:
+            return MitsubaVariant(**kept["variant"])
+    variant, certain = _probed_variant(libraries)
+    if certain:
+        with contextlib.suppress(OSError, InputError):
+            write_text_whole(path, json.dumps({"key": key, "variant": asdict(variant)}) + "\n")
+    return variant
+
+
+def llvm_libraries() -> list[Path]:
+    """Shared LLVM libraries in the usual places, newest first."""
+    folders = [
+        *map(Path, filter(None, os.environ.get("LD_LIBRARY_PATH", "").split(os.pathsep))),
+        Path(sys.prefix) / "lib",
+        *(Path("/usr/lib") / f"{platform.machine()}-linux-gnu", Path("/usr/lib64"), Path("/usr/lib")),
+        *(Path("/usr/local/lib"), *sorted(Path("/usr/lib").glob("llvm*/lib"))),
+        *sorted(Path("/opt/homebrew/opt").glob("llvm*/lib")),
+    ]
+    found: dict[Path, int] = {}
+    for folder in folders:
+        for path in folder.glob("libLLVM*"):
+            match = re.fullmatch(
+                r"libLLVM(?:-|\.so\.)(\d+)[\d.]*(?:\.so[\d.]*)?|libLLVM\.dylib", path.resolve().name
+            )
+            if match and int(match[1] or OLDEST_LLVM) >= OLDEST_LLVM:
+                found[path.resolve()] = int(match[1] or OLDEST_LLVM)
+    return sorted(found, key=lambda path: (-found[path], str(path)))
+
+
+def _probed_variant(libraries: list[str | None]) -> tuple[MitsubaVariant, bool]:
+    """The variant, and whether a second try would surely say the same."""
+    certain = True
+    for library in libraries:
+        environment = dict(os.environ) | ({"DRJIT_LIBLLVM_PATH": library} if library else {})
+        try:
+            probe = subprocess.run(
+                [sys.executable, "-P", "-c", _PROBE],
+                env=environment,
+                capture_output=True,
+                timeout=PROBE_SECONDS,
+            )
+        except (subprocess.TimeoutExpired, OSError):
+            certain = False
+            continue
+        if probe.returncode == 0:
+            sentence = f"Mitsuba runs llvm_ad_rgb on {library or 'the LLVM library that Dr.Jit found'}."
+            return MitsubaVariant("llvm_ad_rgb", library, sentence), certain
+    tried = ", ".join(library for library in libraries if library) or "none found"
+    return (
+        MitsubaVariant(
+            "scalar_rgb",
+            None,
+            f"Mitsuba falls back to scalar_rgb, some 40 times slower: no LLVM library works here "
+            f"(tried: {tried}); LLVM 19 does (Debian: apt-get install libllvm19).",
+        ),
+        certain,
+    )
+
+
+def _machine_key(libraries: list[str | None]) -> str:
+    seen: list[object] = [importlib.metadata.version(name) for name in ("mitsuba", "drjit")]
+    seen += [sys.executable, platform.machine()]
+    for library in libraries:
+        with contextlib.suppress(OSError):
+            status = Path(library).stat() if library else None
+            seen.append([library, status and [status.st_mtime_ns, status.st_size]])
+    with contextlib.suppress(OSError):
+        # A cache folder may be shared by machines whose processors differ.
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        seen.append(next((line for line in lines if line.startswith(("flags", "Features"))), ""))
+    return hashlib.sha256(json.dumps(seen).encode()).hexdigest()

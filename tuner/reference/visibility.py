@@ -1,0 +1,61 @@
+"""Ray-traced visibility between receivers and virtual point lights."""
+
+from functools import partial
+
+import numpy as np
+from jaxtyping import Bool, Float, UInt32
+
+from renderer.scene import Scene
+from tuner.reference.surfaces import OFFSET
+from tuner.reference.traced_scene import TracedScene, traced_scene
+
+LIFT = 4.0 * OFFSET
+"""How far both ends are lifted off their surfaces, in scene diagonals: four times what exact hits need,
+since positions from rasterised buffers lie less exactly on their triangles."""
+
+RAYS_PER_LAUNCH = 2**22
+"""Bounds the memory of one kernel, and with it the wait for an interrupt to be heard."""
+
+
+def ray_traced_visibility(
+    scene: Scene,
+    positions_world: Float[np.ndarray, "receivers 3"],
+    normals_world: Float[np.ndarray, "receivers 3"],
+    vpl_positions_world: Float[np.ndarray, "vpls 3"],
+    vpl_normals_world: Float[np.ndarray, "vpls 3"],
+) -> Bool[np.ndarray, "receivers vpls"]:
+    """Whether nothing stands between each receiver and each VPL.
+
+    Both ends lie on surfaces, with unit normals on the lit side. A pair in which either end is behind the
+    other's tangent plane exchanges no light and is False too, without a ray.
+
+    Raises:
+        InputError: the scene has no triangles, or an index in it is out of range.
+    """
+    traced = traced_scene(scene)
+    lift = LIFT * np.array([1.0])
+    receivers = traced.triangles.to_unit(positions_world) + lift * normals_world
+    vpls = traced.triangles.to_unit(vpl_positions_world) + lift * vpl_normals_world
+    w = traced.wavefront
+    tables = [w.table(a.astype(np.float32)) for a in (receivers, normals_world, vpls, vpl_normals_world)]
+    visible = np.zeros((len(receivers), len(vpls)), bool)
+    rows = max(1, RAYS_PER_LAUNCH // max(1, len(vpls)))
+    for first in range(0, len(receivers) if len(vpls) else 0, rows):
+        chunk = visible[first : first + rows]
+        pair = w.table(np.array([first, len(vpls)], np.uint32))
+        chunk[:] = w.run(partial(_unoccluded, traced, tables, pair, chunk.size)).reshape(chunk.shape)
+    return visible
+
+
+def _unoccluded(traced: TracedScene, tables: list, pair, count: int) -> Bool[np.ndarray, "count"]:
+    w = traced.wavefront
+    receivers, normals, vpls, vpl_normals = tables
+    lane = w.lanes(count)
+    first, row_length = w.take(pair, lane * 0), w.take(pair, lane * 0 + 1)
+    receiver, vpl = first + lane // row_length, lane % row_length
+    origin = w.take_vector(receivers, receiver)
+    # Not of unit length: the segment ends at 1.
+    segment = w.take_vector(vpls, vpl) - origin
+    facing = w.dot(w.take_vector(normals, receiver), segment) > 0.0
+    facing = facing & (w.dot(w.take_vector(vpl_normals, vpl), segment) < 0.0)
+    return w.to_numpy(facing & ~w.occluded(origin, segment, 1.0, facing))

@@ -1,0 +1,112 @@
+"""The command line: `vpltune`, also `python -m tuner`.
+
+Every command returns a `Report`; this module alone prints it, and turns what goes wrong into one
+line and an exit code: 0 done, 2 bad input, 3 the machine lacks something, 4 partly done, 130
+interrupted.
+"""
+
+import contextlib
+import errno
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+
+import typer
+
+from renderer.errors import InputError, MachineError
+from tuner.commands.bench import bench
+from tuner.commands.doctor import doctor
+from tuner.commands.evaluate import evaluate
+from tuner.commands.export import export
+from tuner.commands.fit import fit
+from tuner.commands.render import render
+from tuner.commands.report import (
+    BAD_INPUT,
+    INTERRUPTED,
+    MACHINE_LACKS,
+    Report,
+    one_line,
+    print_json,
+    print_report,
+    stdout_sent_to_stderr,
+)
+
+PROGRAM = "vpltune"
+DEFECT = 1
+
+app = typer.Typer(
+    name=PROGRAM,
+    help="Fits one-bounce indirect light from virtual point lights to a path tracer, and draws with it.",
+    epilog="Exit codes: 0 done, 2 bad input, 3 the machine lacks something, 4 partly done, 130 interrupted.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for command in (fit, render, evaluate, export, doctor, bench):
+    app.command()(command)
+
+
+def main() -> None:
+    """The entry point of the installed command."""
+    code = run(sys.argv[1:])
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Whoever read our output has gone, which is no failure; Python must not try again at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    sys.exit(code)
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command line, print what it reports, and return its exit code."""
+    # Asked for here and not in the commands, because it holds from before they load anything.
+    json_wanted = "--json" in arguments and not {"-h", "--help"} & set(arguments)
+    with stdout_sent_to_stderr() if json_wanted else contextlib.nullcontext():
+        outcome = _outcome(arguments)
+    if isinstance(outcome, int):
+        return outcome
+    with contextlib.suppress(BrokenPipeError):
+        if json_wanted:
+            print_json(outcome.document)
+        else:
+            print_report(outcome)
+    return outcome.exit_code
+
+
+def _outcome(arguments: Sequence[str]) -> Report | int:
+    """What the command returned, or the report of its failure; an exit code where nothing is to be said."""
+    try:
+        result = app(list(arguments), prog_name=PROGRAM, standalone_mode=False)
+        # typer itself turns Ctrl-C within a command into this number.
+        return _failure(INTERRUPTED, "interrupted") if result == INTERRUPTED else result or 0
+    except KeyboardInterrupt:
+        return _failure(INTERRUPTED, "interrupted")
+    except typer.TyperException as error:
+        command = error.ctx.command_path if getattr(error, "ctx", None) else PROGRAM
+        return _failure(BAD_INPUT, f"{error.format_message()} Try: {command} --help")
+    except InputError as error:
+        return _failure(BAD_INPUT, error)
+    except MachineError as error:
+        return _failure(MACHINE_LACKS, error)
+    except MemoryError:
+        return _failure(MACHINE_LACKS, "not enough memory")
+    except OSError as error:
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE, errno.ENOMEM)
+        where = f"{error.filename}: " if error.filename is not None else ""
+        return _failure(MACHINE_LACKS if full else BAD_INPUT, f"{where}{error.strerror or error}")
+    except Exception as error:
+        traceback.print_exc()
+        return _failure(DEFECT, f"a defect of {PROGRAM}, please report it: {type(error).__name__}: {error}")
+
+
+def _failure(exit_code: int, error: object) -> Report:
+    line = one_line(error)
+    print(f"{PROGRAM}: {line}", file=sys.stderr)
+    status = "interrupted" if exit_code == INTERRUPTED else "failed"
+    return Report({"status": status, "error": line}, (), exit_code)
+
+
+if __name__ == "__main__":
+    main()

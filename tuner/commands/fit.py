@@ -1,0 +1,96 @@
+"""`vpltune fit`: a scene in, a tuned config out."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tuner.commands.options import (
+    Bounces,
+    EyeOption,
+    JsonOption,
+    LightConeOption,
+    LightDirectionOption,
+    LightIntensityOption,
+    LightLookAtOption,
+    LightPositionOption,
+    LightTypeOption,
+    LookAtOption,
+    SceneArgument,
+    SeedOption,
+    YfovOption,
+)
+from tuner.commands.report import OK, PARTLY_DONE, Report
+
+
+def fit(
+    scene: SceneArgument,
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="DIR", help="Folder for tuned.json, pictures and metrics."),
+    ],
+    config: Annotated[
+        str, typer.Option(metavar="START.json", help="Start from this config: a file, or `default`.")
+    ] = "default",
+    views: Annotated[int, typer.Option(min=1, max=64, help="How many views to fit.")] = 2,
+    seed: SeedOption = 0,
+    bounces: Annotated[
+        Bounces, typer.Option(help="What to fit to: one bounce, or full global illumination.")
+    ] = "1",
+    eye: EyeOption = None,
+    look_at: LookAtOption = None,
+    yfov: YfovOption = None,
+    light_type: LightTypeOption = None,
+    light_position: LightPositionOption = None,
+    light_look_at: LightLookAtOption = None,
+    light_direction: LightDirectionOption = None,
+    light_intensity: LightIntensityOption = None,
+    light_cone: LightConeOption = None,
+    json: JsonOption = False,
+) -> Report:
+    """Fit a scene: write DIR/tuned.json, before-and-after pictures, views.json and metrics.json."""
+    from renderer.tuned_config import read_config
+    from tuner.commands.progress_display import shown_progress
+    from tuner.commands.view_flags import ViewFlags, camera_from_flags, light_from_flags
+    from tuner.fit_scene import FitOptions, fit_scene
+
+    flags = ViewFlags(
+        eye,
+        look_at,
+        yfov,
+        light_type,
+        light_position,
+        light_look_at,
+        light_direction,
+        light_intensity,
+        light_cone,
+    )
+    options = FitOptions(
+        start=read_config(config),
+        views=views,
+        seed=seed,
+        bounces=bounces,
+        camera=camera_from_flags(flags),
+        light=light_from_flags(flags),
+    )
+    with shown_progress() as progress:
+        result = fit_scene(scene, output, options, progress)
+    return _report(result.document, output, scene)
+
+
+def _report(document: dict, output: Path, scene: Path) -> Report:
+    from rich.markup import escape
+
+    from tuner.commands.metrics_table import metrics_table, parameters_table
+
+    status = document["status"]
+    seconds = document["seconds"]["total"]
+    shown = (
+        parameters_table(document["parameters"]),
+        metrics_table(document["metrics"]),
+        f"{escape(status)} ({seconds:.1f} s)",
+        f"picture: {escape(str(output / 'comparison.png'))}",
+        f"next:    vpltune render {escape(str(scene))} --config {escape(str(output / 'tuned.json'))}"
+        f" -o {escape(str(output / 'tuned.png'))}",
+    )
+    return Report(document, shown, OK if status == "ok" else PARTLY_DONE)

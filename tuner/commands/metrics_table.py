@@ -1,0 +1,46 @@
+"""The table that `fit` and `evaluate` end with."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from renderer.artist_parameters import ARTIST_PARAMETERS
+
+ROWS = ("default", "tuned", "ceiling")
+SPLITS = {"fitted": "fitted views", "held_out": "held-out views"}
+
+
+def metrics_table(metrics: Mapping[str, Any]) -> Any:
+    """A rich table of relMSE, energy ratio and FLIP: default, tuned and ceiling, and the noise floor."""
+    from rich.table import Table
+
+    table = Table(title="One-bounce irradiance against the path tracer", title_justify="left")
+    table.add_column("")
+    for label in SPLITS.values():
+        for name in ("relMSE", "energy", "FLIP"):
+            table.add_column(f"{label}\n{name}", justify="right")
+    for row in ROWS:
+        cells = [
+            _number(metrics.get(split, {}).get(row, {}).get(key))
+            for split in SPLITS
+            for key in ("relmse", "energy_ratio", "flip")
+        ]
+        table.add_row(row, *cells, style="bold" if row == "tuned" else None)
+    floors = [_number(metrics.get(split, {}).get("noise_floor")) for split in SPLITS]
+    table.add_row("noise floor", floors[0], "", "", floors[1], "", "", style="dim")
+    return table
+
+
+def parameters_table(parameters: Mapping[str, float | int]) -> Any:
+    """A rich table of the parameters with their units and meanings."""
+    from rich.table import Table
+
+    table = Table(title="Parameters", title_justify="left")
+    for heading, justify in (("", "left"), ("value", "right"), ("unit", "left"), ("what it does", "left")):
+        table.add_column(heading, justify=justify)
+    for spec in ARTIST_PARAMETERS:
+        table.add_row(f"{spec.symbol}  {spec.name}", f"{parameters[spec.name]:.6g}", spec.unit, spec.meaning)
+    return table
+
+
+def _number(value: Any) -> str:
+    return "–" if value is None else f"{value:.4g}"

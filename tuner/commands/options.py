@@ -1,0 +1,91 @@
+"""Arguments and options that several commands share, and how their text is read.
+
+Nothing here imports more than typer, so that `vpltune --help` comes up at once.
+"""
+
+import math
+import re
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from renderer.errors import InputError
+
+LARGEST_SIDE = 16384
+"""Pixels; also the rule of `views.json`."""
+
+Layer = Literal["final", "direct", "indirect", "irradiance", "albedo", "normal", "depth"]
+Bounces = Literal["1", "all"]
+
+SceneArgument = Annotated[
+    Path, typer.Argument(metavar="SCENE", help="A .gltf, .glb, .obj or .ply file.", show_default=False)
+]
+JsonOption = Annotated[
+    bool, typer.Option("--json", help="Print one JSON object on stdout, everything else on stderr.")
+]
+SeedOption = Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of everything random.")]
+
+VIEW_PANEL = "Camera and light, in world units (else: the scene's own, or chosen)"
+
+
+def _view_option(metavar: str, description: str) -> typer.models.OptionInfo:
+    return typer.Option(metavar=metavar, help=description, show_default=False, rich_help_panel=VIEW_PANEL)
+
+
+EyeOption = Annotated[str | None, _view_option("X,Y,Z", "Where the camera stands.")]
+LookAtOption = Annotated[str | None, _view_option("X,Y,Z", "What it looks at, with +Y up.")]
+YfovOption = Annotated[float | None, _view_option("DEG", "Vertical angle of view, in degrees. [50]")]
+LightTypeOption = Annotated[
+    Literal["spot", "point", "directional"] | None, _view_option("TYPE", "spot, point or directional.")
+]
+LightPositionOption = Annotated[str | None, _view_option("X,Y,Z", "Where a spot or point light stands.")]
+LightLookAtOption = Annotated[str | None, _view_option("X,Y,Z", "What the light points at.")]
+LightDirectionOption = Annotated[str | None, _view_option("X,Y,Z", "The way the light travels.")]
+LightIntensityOption = Annotated[
+    str | None, _view_option("I or R,G,B", "W/sr (spot, point) or W/m² (directional). [1]")
+]
+LightConeOption = Annotated[
+    str | None, _view_option("INNER,OUTER", "A spot's half angles, in degrees. [0,45]")
+]
+
+
+def parse_numbers(text: str, flag: str, counts: tuple[int, ...]) -> list[float]:
+    """Finite numbers parted by commas.
+
+    Raises:
+        InputError: another count of them than `counts` allows, or one is not a finite number.
+    """
+    need = " or ".join(str(count) for count in counts)
+    try:
+        numbers = [float(item) for item in text.split(",")]
+    except ValueError:
+        numbers = []
+    # 1e30: squares of it still fit double precision, and views.json has the same bound.
+    if len(numbers) not in counts or not all(abs(number) <= 1e30 for number in numbers):
+        raise InputError(f"{flag}: must be {need} finite numbers parted by commas, got {text!r:.60}")
+    return numbers
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Width and height in pixels from "640x480".
+
+    Raises:
+        InputError: the text is of another form, or a side is not in [1, LARGEST_SIDE].
+    """
+    match = re.fullmatch(r"([0-9]{1,6})[xX×]([0-9]{1,6})", text)
+    size = (int(match[1]), int(match[2])) if match else (0, 0)
+    if not all(1 <= side <= LARGEST_SIDE for side in size):
+        raise InputError(f"--size: must be WxH with sides from 1 to {LARGEST_SIDE}, got {text!r:.60}")
+    return size
+
+
+def checked_scale(scale: float) -> float:
+    """`scale`, if it is a factor that single precision survives.
+
+    Raises:
+        InputError: not a finite number in [1e-6, 1e6].
+    """
+    if not (math.isfinite(scale) and 1e-6 <= scale <= 1e6):
+        raise InputError(f"--scale: must be a number from 1e-6 to 1e6, got {scale}")
+    return scale

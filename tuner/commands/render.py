@@ -1,0 +1,178 @@
+"""`vpltune render`: one picture, or one layer of it, drawn by the runtime."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from renderer.errors import InputError
+from tuner.commands.options import (
+    EyeOption,
+    JsonOption,
+    Layer,
+    LightConeOption,
+    LightDirectionOption,
+    LightIntensityOption,
+    LightLookAtOption,
+    LightPositionOption,
+    LightTypeOption,
+    LookAtOption,
+    SceneArgument,
+    YfovOption,
+    checked_scale,
+    parse_size,
+)
+from tuner.commands.report import Report, warn
+
+if TYPE_CHECKING:
+    from renderer.runtime import Runtime
+    from renderer.scene import Scene
+    from renderer.views import View
+    from tuner.commands.view_flags import ViewFlags
+
+DEFAULT_SIZE = (960, 540)
+
+
+def render(
+    scene: SceneArgument,
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="OUT", help="A .png for display, or an .exr of linear float32."
+        ),
+    ],
+    config: Annotated[str, typer.Option(metavar="FILE", help="A tuned config, or `default`.")] = "default",
+    layer: Annotated[Layer, typer.Option(help="Which picture to draw.")] = "final",
+    size: Annotated[str | None, typer.Option(metavar="WxH", help="Picture size. [960x540]")] = None,
+    scale: Annotated[float, typer.Option(help="Draw scene, camera and light this much larger.")] = 1.0,
+    views: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Take camera, lights and size from a views.json.")
+    ] = None,
+    view: Annotated[str | None, typer.Option(metavar="NAME", help="Which of its views.")] = None,
+    eye: EyeOption = None,
+    look_at: LookAtOption = None,
+    yfov: YfovOption = None,
+    light_type: LightTypeOption = None,
+    light_position: LightPositionOption = None,
+    light_look_at: LightLookAtOption = None,
+    light_direction: LightDirectionOption = None,
+    light_intensity: LightIntensityOption = None,
+    light_cone: LightConeOption = None,
+    json: JsonOption = False,
+) -> Report:
+    """Draw a scene with a config, headless."""
+    from renderer.image_file import require_extension
+    from renderer.tuned_config import read_config
+    from tuner.commands.view_flags import ViewFlags
+
+    flags = ViewFlags(
+        eye,
+        look_at,
+        yfov,
+        light_type,
+        light_position,
+        light_look_at,
+        light_direction,
+        light_intensity,
+        light_cone,
+    )
+    # All that can be refused is refused before the scene is read.
+    require_extension(output, ".png", ".exr")
+    picture_size = None if size is None else parse_size(size)
+    factor = checked_scale(scale)
+    tuned = read_config(config)
+    from_file = _view_from_file(views, view, flags)
+
+    from renderer.runtime import Runtime
+    from renderer.scene import scaled
+    from renderer.scene_file import read_scene
+    from renderer.views import View, scaled_view
+
+    loaded = read_scene(scene)
+    warn(loaded.warnings)
+    drawn = from_file or _placed_view(loaded, scene, flags)
+    if picture_size is not None:
+        drawn = View(drawn.name, drawn.split, picture_size, drawn.camera, drawn.lights)
+    if factor != 1.0:
+        loaded, drawn = scaled(loaded, factor), scaled_view(drawn, factor)
+    _write_layer(Runtime(loaded, tuned), drawn, layer, output)
+    return _report(scene, output, layer, tuned.parameters.as_dict(), drawn)
+
+
+def _view_from_file(path: Path | None, name: str | None, flags: "ViewFlags") -> "View | None":
+    from renderer.views import read_views
+    from tuner.commands.view_flags import ViewFlags
+
+    if path is None:
+        if name is not None:
+            raise InputError("--view: names a view of --views FILE, which is missing")
+        return None
+    if flags != ViewFlags():
+        raise InputError("--views: has its own camera and lights; leave out the camera and light flags")
+    found = read_views(path)
+    names = [view.name for view in found]
+    if name is None and len(found) > 1:
+        raise InputError(f"--view: must be given, {path} has {', '.join(names)}")
+    if name is not None and name not in names:
+        raise InputError(f"--view: {path} has {', '.join(names)}, got {name!r:.60}")
+    return found[0] if name is None else found[names.index(name)]
+
+
+def _placed_view(scene: "Scene", scene_path: Path, flags: "ViewFlags") -> "View":
+    from renderer.view_placement import resolve_camera_and_lights
+    from renderer.views import View
+    from tuner.commands.view_flags import camera_from_flags, light_from_flags
+
+    camera, lights, notes = resolve_camera_and_lights(
+        scene, scene_path, camera_from_flags(flags), light_from_flags(flags)
+    )
+    warn(notes)
+    return View("main", "fitted", DEFAULT_SIZE, camera, lights)
+
+
+def _write_layer(runtime: "Runtime", view: "View", layer: Layer, output: Path) -> None:
+    from renderer.image_file import write_exr, write_png
+
+    if output.suffix.lower() == ".exr":
+        # The final picture without its tone curve is the radiance that reaches the eye.
+        pixels = runtime.render_radiance(view) if layer == "final" else runtime.render(view, layer)
+        write_exr(output, pixels, "Z" if layer == "depth" else "Y")
+    else:
+        write_png(output, _for_display(runtime, layer, runtime.render(view, layer)))
+
+
+def _for_display(runtime: "Runtime", layer: Layer, pixels: Any) -> Any:
+    """A layer as display-referred colours: each in the way that layer is usually looked at."""
+    import numpy as np
+    from renderer.srgb import srgb_from_linear
+
+    if layer in ("direct", "indirect", "irradiance"):
+        return runtime.display(pixels)
+    if layer == "albedo":
+        return srgb_from_linear(pixels)
+    if layer == "normal":
+        return 0.5 + 0.5 * pixels
+    if layer == "depth":
+        # Nearest over depth: white is nearest, black is nothing, and no unit is involved.
+        seen = pixels > 0.0
+        nearest = pixels[seen].min() if seen.any() else 1.0
+        shown = np.divide(nearest, pixels, out=np.zeros_like(pixels), where=seen)
+        return np.repeat(shown[..., None], 3, axis=2)
+    return pixels
+
+
+def _report(scene: Path, output: Path, layer: Layer, parameters: dict, view: "View") -> Report:
+    from rich.markup import escape
+
+    from renderer.views import views_to_json
+
+    document = {
+        "scene": str(scene),
+        "output": str(output),
+        "layer": layer,
+        "parameters": parameters,
+        "view": views_to_json(str(scene), (view,))["views"][0],
+        "status": "ok",
+    }
+    width, height = view.size
+    return Report(document, (f"wrote {escape(str(output))} ({layer}, {width}x{height})",))

@@ -35,7 +35,12 @@ def glsl_constants(config: TunedConfig) -> str:
     return "\n".join(lines) + "\n"
 
 
+def glsl_name(spec: ParameterSpec) -> str:
+    """The constant's name: VPL_INTENSITY, VPL_COUNT, …"""
+    return f"VPL_{spec.name.removeprefix('vpl_').upper()}"
+
+
 def _declaration(spec: ParameterSpec, value: float | int) -> str:
     glsl_type = "int" if spec.whole_number else "float"
     # repr of a float always has a point or an exponent, and both forms are GLSL float literals.
-    return f"const {glsl_type} VPL_{spec.name.upper()} = {value!r}; // {spec.unit}"
+    return f"const {glsl_type} {glsl_name(spec)} = {value!r}; // {spec.unit}"

@@ -54,7 +54,7 @@ def main() -> None:
     try:
         sys.stdout.flush()
     except BrokenPipeError:
-        # Whoever read our output has gone, which is no failure; Python must not try again at exit.
+        # The reader has gone; Python must not try again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     sys.exit(code)
 
@@ -67,7 +67,8 @@ def run(arguments: Sequence[str]) -> int:
         outcome = _outcome(arguments)
     if isinstance(outcome, int):
         return outcome
-    with contextlib.suppress(BrokenPipeError):
+    # Whoever read our output may have gone, which is no failure; rich leaves by SystemExit then.
+    with contextlib.suppress(BrokenPipeError, SystemExit):
         if json_wanted:
             print_json(outcome.document)
         else:

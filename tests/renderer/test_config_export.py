@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
-from renderer.config_export import exported, glsl_constants
+from renderer.config_export import exported, glsl_constants, glsl_name
 from renderer.errors import InputError
 from renderer.tuned_config import TunedConfig, parse_config
 
@@ -33,8 +33,12 @@ def test_glsl_is_ascii_and_says_names_and_units():
     text = exported(CONFIG, "glsl")
     assert text.isascii()
     for spec in ARTIST_PARAMETERS:
-        assert f"VPL_{spec.name.upper()} = " in text
+        assert f" {glsl_name(spec)} = " in text
         assert f"// {spec.unit}\n" in text
+
+
+def test_glsl_names():
+    assert [glsl_name(spec) for spec in ARTIST_PARAMETERS[-2:]] == ["VPL_COUNT", "VPL_DENSITY_EXPONENT"]
 
 
 def test_an_out_of_range_config_is_not_exported():
@@ -48,9 +52,10 @@ def test_glsl_compiles_and_gives_the_numbers_back(version):
         context = moderngl.create_standalone_context(backend="egl", require=330)
     except Exception as error:
         pytest.skip(f"no OpenGL context on this machine: {error}")
-    names = [spec.name for spec in ARTIST_PARAMETERS]
+    constants = {spec.name: glsl_name(spec) for spec in ARTIST_PARAMETERS}
+    names = list(constants)
     outputs = "".join(f"out float {name};\n" for name in names)
-    body = "".join(f"{name} = float(VPL_{name.upper()});\n" for name in names)
+    body = "".join(f"{name} = float({constant});\n" for name, constant in constants.items())
     shader = f"#version {version} core\n{glsl_constants(CONFIG)}{outputs}void main() {{\n{body}}}\n"
     with context:
         program = context.program(vertex_shader=shader, varyings=names)

@@ -26,7 +26,7 @@ from tuner.commands.report import Report, warn
 
 if TYPE_CHECKING:
     from renderer.runtime import Runtime
-    from renderer.scene import Scene
+    from renderer.scene import Camera, Light, Scene
     from renderer.views import View
     from tuner.commands.view_flags import ViewFlags
 
@@ -63,7 +63,7 @@ def render(
     """Draw a scene with a config, headless."""
     from renderer.image_file import require_extension
     from renderer.tuned_config import read_config
-    from tuner.commands.view_flags import ViewFlags
+    from tuner.commands.view_flags import ViewFlags, camera_from_flags, light_from_flags
 
     flags = ViewFlags(
         eye,
@@ -82,6 +82,7 @@ def render(
     factor = checked_scale(scale)
     tuned = read_config(config)
     from_file = _view_from_file(views, view, flags)
+    camera, light = camera_from_flags(flags), light_from_flags(flags)
 
     from renderer.runtime import Runtime
     from renderer.scene import scaled
@@ -90,7 +91,7 @@ def render(
 
     loaded = read_scene(scene)
     warn(loaded.warnings)
-    drawn = from_file or _placed_view(loaded, scene, flags)
+    drawn = from_file or _placed_view(loaded, scene, camera, light)
     if picture_size is not None:
         drawn = View(drawn.name, drawn.split, picture_size, drawn.camera, drawn.lights)
     if factor != 1.0:
@@ -118,14 +119,13 @@ def _view_from_file(path: Path | None, name: str | None, flags: "ViewFlags") -> 
     return found[0] if name is None else found[names.index(name)]
 
 
-def _placed_view(scene: "Scene", scene_path: Path, flags: "ViewFlags") -> "View":
+def _placed_view(
+    scene: "Scene", scene_path: Path, camera_given: "Camera | None", light_given: "Light | None"
+) -> "View":
     from renderer.view_placement import resolve_camera_and_lights
     from renderer.views import View
-    from tuner.commands.view_flags import camera_from_flags, light_from_flags
 
-    camera, lights, notes = resolve_camera_and_lights(
-        scene, scene_path, camera_from_flags(flags), light_from_flags(flags)
-    )
+    camera, lights, notes = resolve_camera_and_lights(scene, scene_path, camera_given, light_given)
     warn(notes)
     return View("main", "fitted", DEFAULT_SIZE, camera, lights)
 
@@ -144,6 +144,7 @@ def _write_layer(runtime: "Runtime", view: "View", layer: Layer, output: Path) -
 def _for_display(runtime: "Runtime", layer: Layer, pixels: Any) -> Any:
     """A layer as display-referred colours: each in the way that layer is usually looked at."""
     import numpy as np
+
     from renderer.srgb import srgb_from_linear
 
     if layer in ("direct", "indirect", "irradiance"):

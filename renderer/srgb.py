@@ -1,0 +1,11 @@
+"""The sRGB transfer curve (IEC 61966-2-1:1999)."""
+
+import numpy as np
+from jaxtyping import Float
+
+
+def srgb_from_linear(linear: Float[np.ndarray, "*shape"]) -> Float[np.ndarray, "*shape"]:
+    """Linear values in [0, 1] to sRGB-encoded ones; what lies outside is clamped to it first."""
+    clamped = np.clip(linear, 0.0, 1.0)
+    encoded = np.where(clamped <= 0.0031308, 12.92 * clamped, 1.055 * clamped ** (1.0 / 2.4) - 0.055)
+    return encoded.astype(linear.dtype)

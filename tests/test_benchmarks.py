@@ -1,0 +1,58 @@
+"""Benchmarks are found, run and reported; what they measure is not judged here."""
+
+import json
+import math
+
+import pytest
+
+import benchmarks
+import benchmarks.machine
+from benchmarks.registry import benchmark_names
+from benchmarks.row import Row
+from tuner.__main__ import run
+
+
+def test_a_row_has_the_ratio():
+    row = Row("fit_cold_s", 30.0, "s", "limit", 60.0)
+    assert row.as_dict() == {
+        "name": "fit_cold_s",
+        "value": 30.0,
+        "unit": "s",
+        "against": "limit",
+        "against_value": 60.0,
+        "ratio": 0.5,
+    }
+    assert math.isnan(Row("a", 1.0, "s", "nothing", 0.0).ratio)
+
+
+def test_modules_that_are_no_benchmark_are_not_listed():
+    assert not {"row", "machine", "registry"} & set(benchmark_names())
+
+
+def test_the_machine_is_one_line():
+    description = benchmarks.machine.machine_description()
+    assert "\n" not in description
+    assert "cores" in description
+    assert "GiB" in description
+
+
+@pytest.mark.parametrize(
+    "arguments", [["bench", "boil", "--json"], ["bench", "all", "--json"], ["bench", "--json"]]
+)
+def test_bench_prints_the_rows(capfd, monkeypatch, arguments):
+    def run_benchmark(name, progress):
+        progress(name, 1.0)
+        return [Row(f"{name}_s", 2.0, "s", "limit", 4.0)]
+
+    monkeypatch.setattr(benchmarks, "benchmark_names", lambda: ("boil",))
+    monkeypatch.setattr(benchmarks, "run_benchmark", run_benchmark)
+    monkeypatch.setattr(benchmarks.machine, "machine_description", lambda: "a machine")
+    assert run(arguments) == 0
+    shown = capfd.readouterr()
+    assert json.loads(shown.out) == {
+        "machine": "a machine",
+        "rows": [Row("boil_s", 2.0, "s", "limit", 4.0).as_dict()],
+    }
+    assert shown.err == "vpltune: boil\n"
+    assert run(["bench", "boil"]) == 0
+    assert "boil_s" in capfd.readouterr().out

@@ -1,0 +1,78 @@
+"""What is printed at the end of a command, and while it works."""
+
+import json
+import math
+
+from rich.console import Console
+
+from renderer.artist_parameters import ArtistParameters
+from tuner.commands.metrics_table import metrics_table, parameters_table
+from tuner.commands.progress_display import shown_progress
+from tuner.commands.report import print_json
+
+
+def text_of(table):
+    console = Console(width=140, record=True, file=open("/dev/null", "w"))
+    with console.file:
+        console.print(table)
+    return console.export_text()
+
+
+def scores(relmse):
+    return {"relmse": relmse, "energy_ratio": 1.25, "flip": 0.0625}
+
+
+def test_the_metrics_table_shows_every_number():
+    metrics = {
+        "fitted": {
+            "default": scores(0.5),
+            "tuned": scores(0.25),
+            "ceiling": scores(0.125),
+            "noise_floor": 1e-4,
+        },
+        "held_out": {
+            "default": scores(0.6),
+            "tuned": scores(0.3),
+            "ceiling": scores(None),
+            "noise_floor": None,
+        },
+    }
+    text = text_of(metrics_table(metrics))
+    rows = {line.split("│")[1].strip(): line for line in text.splitlines() if line.startswith("│")}
+    assert {"0.5", "0.6", "1.25", "0.0625"} <= set(rows["default"].replace("│", " ").split())
+    assert {"0.25", "0.3"} <= set(rows["tuned"].replace("│", " ").split())
+    assert "–" in rows["ceiling"]
+    assert "0.0001" in rows["noise floor"]
+
+
+def test_the_parameters_table_has_units_and_meanings():
+    text = text_of(parameters_table(ArtistParameters(intensity=1.5).as_dict()))
+    assert "1.5" in text
+    assert "VPL footprints" in text
+    assert "k  intensity" in text
+
+
+def test_json_has_null_where_a_number_is_not_finite(capsys):
+    print_json({"a": math.nan, "b": [math.inf, 1.5], "c": {"d": -math.inf}, "e": "text", "f": (1, True)})
+    printed = json.loads(capsys.readouterr().out)
+    assert printed == {"a": None, "b": [None, 1.5], "c": {"d": None}, "e": "text", "f": [1, True]}
+
+
+def test_without_a_terminal_each_stage_is_one_line_on_stderr(capsys):
+    with shown_progress() as progress:
+        for stage, fraction in (("reference", 0.0), ("reference", 0.5), ("fit", 0.0), ("reference", 1.0)):
+            progress(stage, fraction)
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err == "vpltune: reference\nvpltune: fit\n"
+
+
+def test_on_a_terminal_stages_are_bars(capsys, monkeypatch):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    with shown_progress() as progress:
+        progress("reference", 0.5)
+        progress("fit", 1.0)
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert "reference" in shown.err
+    assert "fit" in shown.err

@@ -13,15 +13,16 @@ SHORTENING = 2.0**-13
 _NUMBERS_PER_LIGHT = 12
 
 
-def light_table(triangles: UnitTriangles, lights: tuple[Light, ...]) -> Float32[np.ndarray, "lights 4 3"]:
+def light_table(triangles: UnitTriangles, lights: tuple[Light, ...]) -> Float32[np.ndarray, "rows 4 3"]:
     """Lights in unit space. Rows: where the light is, the way it shines, its intensity, and
     (1 for a light at a place or 0 for one at infinity, scale and offset of the cone falloff).
 
     Falloff is clamp(cos θ · scale + offset, 0, 1)², as KHR_lights_punctual writes it; scale 0 and
     offset 1 make a light that has none. Where a light is at infinity, its place is the way to it.
     """
-    table = np.zeros((len(lights), 4, 3))
-    for row, light in zip(table, lights, strict=True):
+    # Never without a row: Dr.Jit cannot look anything up in an empty table, even where it never does.
+    table = np.zeros((max(1, len(lights)), 4, 3))
+    for row, light in zip(table, lights, strict=False):
         at_infinity = light.kind == "directional"
         row[0] = -light.direction_world if at_infinity else triangles.to_unit(light.position_world)
         row[1] = light.direction_world

@@ -2,7 +2,6 @@
 
 from typing import Any, NamedTuple
 
-
 from tuner.reference.unit_triangles import WRAP_MODES, UnitTriangles, srgb_decode_table
 
 OFFSET = 2.0**-17

@@ -35,9 +35,10 @@ OLDEST_LLVM = 15
 _PROBE = """
 import mitsuba as mi
 mi.set_variant("llvm_ad_rgb")
-sphere = {"type": "scene", "lamp": {"type": "point"}, "integrator": {"type": "path"}, "ball": {"type": "sphere"},
-          "eye": {"type": "perspective", "film": {"type": "hdrfilm", "width": 8, "height": 8}}}
-assert mi.render(mi.load_dict(sphere), spp=1).numpy().shape == (8, 8, 3)
+eye = {"type": "perspective", "film": {"type": "hdrfilm", "width": 8, "height": 8}}
+lit = {"type": "scene", "eye": eye, "lamp": {"type": "point"}, "ball": {"type": "sphere"}}
+lit["integrator"] = {"type": "path"}
+assert mi.render(mi.load_dict(lit), spp=1).numpy().shape == (8, 8, 3)
 """
 
 

@@ -3,7 +3,7 @@
 from functools import partial
 
 import numpy as np
-from jaxtyping import Bool, Float, UInt32
+from jaxtyping import Bool, Float
 
 from renderer.scene import Scene
 from tuner.reference.surfaces import OFFSET

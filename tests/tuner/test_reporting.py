@@ -1,5 +1,6 @@
 """What is printed at the end of a command, and while it works."""
 
+import io
 import json
 import math
 
@@ -12,9 +13,8 @@ from tuner.commands.report import print_json
 
 
 def text_of(table):
-    console = Console(width=140, record=True, file=open("/dev/null", "w"))
-    with console.file:
-        console.print(table)
+    console = Console(width=140, record=True, file=io.StringIO())
+    console.print(table)
     return console.export_text()
 
 

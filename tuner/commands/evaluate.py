@@ -1,10 +1,13 @@
 """`vpltune evaluate`: how close a config comes to the path tracer."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
+from renderer.errors import InputError
 from tuner.commands.options import (
+    LARGEST_VIEW_COUNT,
     Bounces,
     EyeOption,
     JsonOption,
@@ -19,13 +22,15 @@ from tuner.commands.options import (
     SeedOption,
     YfovOption,
 )
-from tuner.commands.report import OK, PARTLY_DONE, Report
+from tuner.commands.report import OK, PARTLY_DONE, Report, warn
 
 
 def evaluate(
     scene: SceneArgument,
     config: Annotated[str, typer.Option(metavar="FILE", help="The tuned config: a file, or `default`.")],
-    views: Annotated[int, typer.Option(min=1, max=64, help="How many views, of those that were fitted.")] = 2,
+    views: Annotated[
+        str, typer.Option(metavar="N|FILE", help="How many views are fitted, or the views.json of a fit.")
+    ] = "2",
     seed: SeedOption = 0,
     bounces: Annotated[
         Bounces, typer.Option(help="What to compare with: one bounce, or full global illumination.")
@@ -42,6 +47,8 @@ def evaluate(
     json: JsonOption = False,
 ) -> Report:
     """Compare default, tuned and ceiling with the reference, on fitted and on held-out views and lights."""
+    from rich.markup import escape
+
     from renderer.tuned_config import read_config
     from tuner.commands.metrics_table import metrics_table
     from tuner.commands.progress_display import shown_progress
@@ -61,13 +68,27 @@ def evaluate(
     )
     options = EvaluateOptions(
         tuned=read_config(config),
-        views=views,
         seed=seed,
         bounces=bounces,
         camera=camera_from_flags(flags),
         light=light_from_flags(flags),
+        **_views(views, flags != ViewFlags()),
     )
     with shown_progress() as progress:
         document = evaluate_scene(scene, options, progress).document
-    shown = (metrics_table(document["metrics"]), document["status"])
+    warn(tuple(document["notes"]))
+    shown = (metrics_table(document["metrics"]), f"views: {escape(document['views'])}")
     return Report(document, shown, OK if document["status"] == "ok" else PARTLY_DONE)
+
+
+def _views(text: str, placed: bool) -> dict[str, Any]:
+    """The options that say which views: how many, or exactly those of a file."""
+    from renderer.views import read_views
+
+    if text.isdecimal():
+        if not 1 <= len(text) <= 4 or not 1 <= int(text) <= LARGEST_VIEW_COUNT:
+            raise InputError(f"--views: must be from 1 to {LARGEST_VIEW_COUNT}, or a file, got {text:.60}")
+        return {"views": int(text)}
+    if placed:
+        raise InputError("--views: a file has its own cameras and lights; leave out the flags for them")
+    return {"views_path": Path(text), "fixed_views": read_views(Path(text))}

@@ -1,11 +1,13 @@
 """`vpltune fit`: a scene in, a tuned config out."""
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from tuner.commands.options import (
+    LARGEST_VIEW_COUNT,
     Bounces,
     EyeOption,
     JsonOption,
@@ -20,7 +22,7 @@ from tuner.commands.options import (
     SeedOption,
     YfovOption,
 )
-from tuner.commands.report import OK, PARTLY_DONE, Report
+from tuner.commands.report import OK, PARTLY_DONE, Report, warn
 
 
 def fit(
@@ -32,7 +34,7 @@ def fit(
     config: Annotated[
         str, typer.Option(metavar="START.json", help="Start from this config: a file, or `default`.")
     ] = "default",
-    views: Annotated[int, typer.Option(min=1, max=64, help="How many views to fit.")] = 2,
+    views: Annotated[int, typer.Option(min=1, max=LARGEST_VIEW_COUNT, help="How many views to fit.")] = 2,
     seed: SeedOption = 0,
     bounces: Annotated[
         Bounces, typer.Option(help="What to fit to: one bounce, or full global illumination.")
@@ -75,22 +77,22 @@ def fit(
     )
     with shown_progress() as progress:
         result = fit_scene(scene, output, options, progress)
-    return _report(result.document, output, scene)
+    warn(result.notes)
+    return _report(result.document, output)
 
 
-def _report(document: dict, output: Path, scene: Path) -> Report:
+def _report(document: dict, output: Path) -> Report:
     from rich.markup import escape
 
     from tuner.commands.metrics_table import metrics_table, parameters_table
 
-    status = document["status"]
-    seconds = document["seconds"]["total"]
+    config, picture = output / "tuned.json", output / "tuned.png"
+    command = ["vpltune", "render", document["scene"], "--config", str(config), "-o", str(picture)]
     shown = (
         parameters_table(document["parameters"]),
         metrics_table(document["metrics"]),
-        f"{escape(status)} ({seconds:.1f} s)",
+        f"{escape(document['sentence'])} ({document['seconds']['total']:.1f} s)",
         f"picture: {escape(str(output / 'comparison.png'))}",
-        f"next:    vpltune render {escape(str(scene))} --config {escape(str(output / 'tuned.json'))}"
-        f" -o {escape(str(output / 'tuned.png'))}",
+        f"next:    {escape(shlex.join(command))}",
     )
-    return Report(document, shown, OK if status == "ok" else PARTLY_DONE)
+    return Report(document, shown, OK if document["status"] == "ok" else PARTLY_DONE)

@@ -15,6 +15,8 @@ from renderer.errors import InputError
 LARGEST_SIDE = 16384
 """Pixels; also the rule of `views.json`."""
 
+LARGEST_VIEW_COUNT = 64
+
 Layer = Literal["final", "direct", "indirect", "irradiance", "albedo", "normal", "depth"]
 Bounces = Literal["1", "all"]
 

@@ -125,7 +125,9 @@ def _placed_view(
     from renderer.view_placement import resolve_camera_and_lights
     from renderer.views import View
 
-    camera, lights, notes = resolve_camera_and_lights(scene, scene_path, camera_given, light_given)
+    camera, lights, notes = resolve_camera_and_lights(
+        scene, scene_path, camera_given, None if light_given is None else (light_given,)
+    )
     warn(notes)
     return View("main", "fitted", DEFAULT_SIZE, camera, lights)
 

@@ -1,13 +1,13 @@
 """What a command hands back, and how it reaches the user: one JSON object, or text and tables."""
 
 import contextlib
-import json
-import math
 import os
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
+
+from renderer.strict_json import strict_json
 
 OK = 0
 BAD_INPUT = 2
@@ -52,7 +52,7 @@ def print_report(report: Report) -> None:
 
 def print_json(document: Mapping[str, Any]) -> None:
     """Print `document` on stdout as one JSON object; a number that is not finite becomes null."""
-    print(json.dumps(_finite(document), indent=2, allow_nan=False), flush=True)
+    print(strict_json(document), flush=True)
 
 
 def warn(lines: tuple[str, ...]) -> None:
@@ -64,13 +64,3 @@ def warn(lines: tuple[str, ...]) -> None:
 def one_line(text: object) -> str:
     """`text` with every run of white space made one space."""
     return " ".join(str(text).split())
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _finite(member) for key, member in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(member) for member in value]
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    return value

@@ -17,9 +17,11 @@ def written_whole(path: Path) -> Iterator[Path]:
     exception, an interrupt among them, it is removed and `path` is left as it was.
 
     Raises:
-        InputError: the folder cannot be made or written to.
+        InputError: the folder cannot be made or written to, or `path` is itself a folder.
     """
     path = Path(path)
+    if path.is_dir():
+        raise InputError(f"{path}: cannot be written (it is a folder)")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)

@@ -11,6 +11,7 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
+from pathlib import Path
 
 import typer
 
@@ -39,7 +40,6 @@ app = typer.Typer(
     name=PROGRAM,
     help="Fits one-bounce indirect light from virtual point lights to a path tracer, and draws with it.",
     epilog="Exit codes: 0 done, 2 bad input, 3 the machine lacks something, 4 partly done, 130 interrupted.",
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -50,11 +50,13 @@ for command in (fit, render, evaluate, export, doctor, bench):
 
 def main() -> None:
     """The entry point of the installed command."""
+    # Started with stdout closed, Python has none; the first file opened then stands in its place.
+    sys.stdout = sys.stdout or Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115
     code = run(sys.argv[1:])
     try:
         sys.stdout.flush()
-    except BrokenPipeError:
-        # The reader has gone; Python must not try again at exit.
+    except OSError:
+        # Reported already, if it was a failure; Python must not try again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     sys.exit(code)
 
@@ -64,15 +66,19 @@ def run(arguments: Sequence[str]) -> int:
     # Asked for here and not in the commands, because it holds from before they load anything.
     json_wanted = "--json" in arguments and not {"-h", "--help"} & set(arguments)
     with stdout_sent_to_stderr() if json_wanted else contextlib.nullcontext():
-        outcome = _outcome(arguments)
+        outcome = _outcome(arguments or ["--help"])
     if isinstance(outcome, int):
         return outcome
-    # Whoever read our output may have gone, which is no failure; rich leaves by SystemExit then.
-    with contextlib.suppress(BrokenPipeError, SystemExit):
+    try:
         if json_wanted:
             print_json(outcome.document)
         else:
             print_report(outcome)
+    except (BrokenPipeError, SystemExit):
+        # Whoever read our output has gone, which is no failure; rich leaves by SystemExit then.
+        pass
+    except OSError as error:
+        return _failure(MACHINE_LACKS, f"standard output: {error.strerror}").exit_code
     return outcome.exit_code
 
 
@@ -86,7 +92,7 @@ def _outcome(arguments: Sequence[str]) -> Report | int:
         return _failure(INTERRUPTED, "interrupted")
     except typer.TyperException as error:
         command = error.ctx.command_path if getattr(error, "ctx", None) else PROGRAM
-        return _failure(BAD_INPUT, f"{error.format_message()} Try: {command} --help")
+        return _failure(BAD_INPUT, f"{error.format_message().rstrip('.')}. Try: {command} --help")
     except InputError as error:
         return _failure(BAD_INPUT, error)
     except MachineError as error:

@@ -48,6 +48,13 @@ def test_help_lists_every_command(capfd):
     assert "130 interrupted" in shown
 
 
+def test_no_arguments_are_a_call_for_help(capfd):
+    assert run([]) == 0
+    shown = capfd.readouterr()
+    assert "Usage: vpltune" in shown.out
+    assert shown.err == ""
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_has_help_and_json(capfd, name):
     assert run([name, "--help"]) == 0
@@ -241,4 +248,34 @@ def test_a_reader_that_has_gone_is_no_failure(tmp_path):
     process.stdout = None
     _, err = process.communicate(timeout=30)
     assert (process.returncode, err) == (0, "")
+    assert (tmp_path / "out.json").exists()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
+@pytest.mark.parametrize("more", [[], ["--json"]])
+def test_a_full_disk_under_stdout_is_one_line_and_exit_code_3(tmp_path, more):
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "tuner", *export_to(tmp_path, *more)],
+            cwd=REPOSITORY,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=30,
+        )
+    assert done.returncode == 3
+    assert done.stderr == "vpltune: standard output: No space left on device\n"
+
+
+@pytest.mark.parametrize("more", [[], ["--json"]])
+def test_a_closed_stdout_does_not_stop_the_work(tmp_path, more):
+    command = [sys.executable, "-m", "tuner", *export_to(tmp_path, *more)]
+    done = subprocess.run(
+        ["sh", "-c", 'exec "$@" >&-', "sh", *command],
+        cwd=REPOSITORY,
+        capture_output=True,
+        text=True,
+        timeout=30,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "out.json").exists()

@@ -60,10 +60,17 @@ def test_views_have_both_splits_and_can_be_drawn(fitted, document, capfd):
     views = read_views(Path(document["views"]))
     assert {view.split for view in views} == {"fitted", "held_out"}
     tuned = str(fitted / "out" / "tuned.json")
-    arguments = ["--views", document["views"], "--view", views[-1].name, "--config", tuned]
-    assert (
-        run(["render", str(SCENE), "-o", str(fitted / "view.exr"), "--layer", "irradiance", *arguments]) == 0
-    )
+    arguments = [
+        "--views",
+        document["views"],
+        "--view",
+        views[-1].name,
+        "--config",
+        tuned,
+        "--layer",
+        "irradiance",
+    ]
+    assert run(["render", str(SCENE), "-o", str(fitted / "view.exr"), *arguments]) == 0
 
 
 def test_evaluate_finds_the_same_figures_on_the_same_views(fitted, document, capfd):

@@ -1,7 +1,7 @@
 """The reference: what one bounce of indirect light really is, path-traced with Mitsuba."""
 
 from tuner.reference.reference_view import ReferenceView, noise_floor
-from tuner.reference.reference_views import reference_views
+from tuner.reference.references import reference_views
 from tuner.reference.variant import MitsubaVariant, describe_variant
 
 __all__ = [

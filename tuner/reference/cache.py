@@ -44,7 +44,8 @@ def load(key: str) -> ReferenceView | None:
     with contextlib.suppress(OSError):
         os.utime(path)
     with np.load(io.BytesIO(payload), allow_pickle=False) as arrays:
-        return ReferenceView(**{name: arrays[name][()] for name in arrays.files})
+        found = {name: arrays[name] for name in arrays.files}
+    return ReferenceView(**{name: a if a.ndim else a.item() for name, a in found.items()})
 
 
 def store(key: str, reference: ReferenceView) -> None:

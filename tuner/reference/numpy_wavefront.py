@@ -38,8 +38,7 @@ class NumpyWavefront:
             going = condition(*state)
             if not np.any(going):
                 return state
-            # Lanes that are done keep their state, as in a Dr.Jit loop.
-            state = tuple(np.where(going, new, old) for new, old in zip(body(*state), state, strict=True))
+            state = _advanced(going, body(*state), state)
 
     def closest_hit(self, origin, direction, active):
         lanes = direction.shape[1]
@@ -111,3 +110,10 @@ class NumpyWavefront:
     floor = staticmethod(np.floor)
     sin = staticmethod(np.sin)
     cos = staticmethod(np.cos)
+
+
+def _advanced(going, new, old):
+    """`new` in lanes that are going, `old` in those that are done, through nested tuples."""
+    if isinstance(old, tuple):
+        return tuple(_advanced(going, *pair) for pair in zip(new, old, strict=True))
+    return np.where(going, new, old)

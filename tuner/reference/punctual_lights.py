@@ -1,64 +1,104 @@
-"""Direct irradiance from spot, point and directional lights, with shadow rays."""
+"""Spot, point and directional lights: the irradiance they bring, and light paths that start at them."""
+
+import math
 
 import numpy as np
 from jaxtyping import Float32
 
 from renderer.scene import Light
+from tuner.reference.directions import cone_direction, disc_point
 from tuner.reference.surfaces import Surface
 from tuner.reference.unit_triangles import UnitTriangles
 
 SHORTENING = 2.0**-13
 """A shadow ray stops this share of its length before a light, which may be set into a surface."""
 
-_NUMBERS_PER_LIGHT = 12
+BEAM_RADIUS = 0.51
+"""Radius of the disc that directional light paths start from: a scene of diagonal 1 lies in its beam."""
+
+_ROWS = 5
 
 
-def light_table(triangles: UnitTriangles, lights: tuple[Light, ...]) -> Float32[np.ndarray, "rows 4 3"]:
-    """Lights in unit space. Rows: where the light is, the way it shines, its intensity, and
-    (1 for a light at a place or 0 for one at infinity, scale and offset of the cone falloff).
+class PunctualLights:
+    """The lights of one view in unit space, on one wavefront."""
 
-    Falloff is clamp(cos θ · scale + offset, 0, 1)², as KHR_lights_punctual writes it; scale 0 and
-    offset 1 make a light that has none. Where a light is at infinity, its place is the way to it.
+    def __init__(self, wavefront, triangles: UnitTriangles, lights: tuple[Light, ...]):
+        self._wavefront = wavefront
+        self._table = wavefront.table(_light_table(triangles, lights))
+        self.count = wavefront.table(np.array([len(lights)], np.uint32))
+
+    def _row(self, index, row: int):
+        return self._wavefront.take_vector(self._table, index * _ROWS + row)
+
+    def arriving(self, index, at: Surface):
+        """The unit vector to light `index`, the distance, its irradiance on the side of each surface that its
+        shading normal points to (W/m², no shadow), and the density of its light paths per surface area.
+
+        E = I(ω)·max(0, cos θ)/d² for spot and point lights, E⊥·max(0, cos θ) for directional ones.
+        """
+        w = self._wavefront
+        place, direction, intensity, falloff, density = (self._row(index, row) for row in range(_ROWS))
+        to_light = place - at.position * falloff[0]
+        # 1e-12: a millionth of the diagonal squared, nearer than any ray starts.
+        squared = w.maximum(w.dot(to_light, to_light), 1e-12)
+        distance = w.sqrt(squared)
+        to_light = to_light / distance
+        cone = w.minimum(w.maximum(falloff[2] - w.dot(to_light, direction) * falloff[1], 0.0), 1.0)
+        cosine = w.maximum(w.dot(at.shading_normal, to_light), 0.0)
+        slant = w.dot(at.geometric_normal, to_light)
+        paths = density[0] * w.maximum(slant, -slant) / squared
+        reach = w.where(falloff[0] > 0.0, distance, 1e30)
+        return to_light, reach, intensity * (cone * cone * cosine / squared), paths
+
+    def irradiance(self, at: Surface, active, weight=None):
+        """Irradiance from all lights (W/m²) with shadows. `weight`, of the density of light paths, scales
+        the share of each light."""
+        w = self._wavefront
+
+        def add_light(index, total):
+            to_light, reach, irradiance, paths = self.arriving(index, at)
+            lit = active & (w.dot(irradiance, irradiance) > 0.0)
+            origin = at.ray_origin(w, to_light)
+            unshadowed = lit & ~w.occluded(origin, to_light, reach * (1.0 - SHORTENING), lit)
+            share = 1.0 if weight is None else weight(paths)
+            return index + 1, total + w.where(unshadowed, irradiance * share, 0.0)
+
+        state = (self.count * 0, at.position * 0.0)
+        return w.loop(lambda index, _: index < self.count, add_light, state)[1]
+
+    def emitted(self, index, u, v):
+        """Origin and direction of a light path, of the density that `arriving` states where it lands."""
+        w = self._wavefront
+        place, direction, falloff, density = (self._row(index, row) for row in (0, 1, 3, 4))
+        placed = falloff[0] > 0.0
+        beam = disc_point(w, direction, u, v) * BEAM_RADIUS - direction
+        return w.where(placed, place, beam), w.where(
+            placed, cone_direction(w, direction, density[1], u, v), direction
+        )
+
+
+def _light_table(triangles: UnitTriangles, lights: tuple[Light, ...]) -> Float32[np.ndarray, "lights 5 3"]:
+    """Rows: where the light is, or the way to it if it is at infinity; the way it shines; its intensity;
+    (1 if it is at a place or 0 at infinity, scale and offset of the cone falloff); (density of its paths per
+    steradian or per area of the beam, least cosine of their angle, unused).
+
+    Falloff is clamp(cos θ·scale + offset, 0, 1)², as KHR_lights_punctual writes it; scale 0 and offset 1
+    make a light that has none.
     """
     # Never without a row: Dr.Jit cannot look anything up in an empty table, even where it never does.
-    table = np.zeros((max(1, len(lights)), 4, 3))
+    table = np.zeros((max(1, len(lights)), _ROWS, 3))
     for row, light in zip(table, lights, strict=False):
         at_infinity = light.kind == "directional"
         row[0] = -light.direction_world if at_infinity else triangles.to_unit(light.position_world)
         row[1] = light.direction_world
         row[2] = triangles.unit_intensity(light)
         row[3] = [0.0 if at_infinity else 1.0, 0.0, 1.0]
+        least = -1.0
         if light.kind == "spot":
-            cos_outer = np.cos(light.outer_cone)
+            least = np.cos(light.outer_cone)
             # 1e-7: equal angles make a hard edge, and no division by zero.
-            scale = 1.0 / max(np.cos(light.inner_cone) - cos_outer, 1e-7)
-            row[3, 1:] = scale, -cos_outer * scale
+            scale = 1.0 / max(np.cos(light.inner_cone) - least, 1e-7)
+            row[3, 1:] = scale, -least * scale
+        area = BEAM_RADIUS**2 if at_infinity else 2.0 * (1.0 - least)
+        row[4] = [1.0 / (math.pi * area), least, 0.0]
     return table.astype(np.float32)
-
-
-def direct_irradiance(wavefront, at: Surface, lights, light_count, active):
-    """Irradiance (W/m²) that `lights` bring to the side of each surface that its normal points to.
-
-    E = Σ I(ω)·max(0, cos θ)·V/d² for spot and point, E⊥·max(0, cos θ)·V for directional lights.
-    """
-    w = wavefront
-
-    def add_light(index, irradiance):
-        place, direction, intensity, shape = (w.take_vector(lights, index * 4 + row) for row in range(4))
-        to_light = place - at.position * shape[0]
-        # 1e-12: a millionth of the diagonal squared, nearer than any ray starts.
-        squared = w.maximum(w.dot(to_light, to_light), 1e-12)
-        distance = w.sqrt(squared)
-        to_light = to_light / distance
-        cosine = w.dot(at.shading_normal, to_light)
-        cone = w.minimum(w.maximum(shape[2] - w.dot(to_light, direction) * shape[1], 0.0), 1.0)
-        arriving = cone * cone * cosine / squared
-        lit = active & (arriving > 0.0)
-        max_t = w.where(shape[0] > 0.0, distance * (1.0 - SHORTENING), 1e30)
-        blocked = w.occluded(at.ray_origin(w, to_light), to_light, max_t, lit)
-        return index + 1, irradiance + intensity * w.where(lit & ~blocked, arriving, 0.0)
-
-    zero = at.position * 0.0
-    first = light_count * 0
-    _, irradiance = w.loop(lambda index, _: index < light_count, add_light, (first, zero))
-    return irradiance

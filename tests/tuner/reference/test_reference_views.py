@@ -1,0 +1,232 @@
+"""What a reference promises: the same bits again, independent halves, known noise, any scale."""
+
+import os
+import pickle
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from renderer.scene import scaled
+from renderer.views import scaled_view
+from tuner.reference import ReferenceView, cache, noise_floor, reference_views
+
+PICTURES = ("irradiance_a", "irradiance_b", "direct_irradiance", "albedo", "position_world", "normal_world")
+
+
+def no_cache(monkeypatch, tmp_path):
+    monkeypatch.setenv("VPLTUNE_CACHE", str(tmp_path))
+
+
+def same(a: ReferenceView, b: ReferenceView) -> bool:
+    pictures = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in (*PICTURES, "valid"))
+    return pictures and a.samples == b.samples
+
+
+def test_same_seed_same_bits_and_another_seed_others(shapes, monkeypatch, tmp_path):
+    scene, view = shapes.box_room(), shapes.box_room_view()
+    made = []
+    for run, seed in enumerate((5, 5, 6)):
+        no_cache(monkeypatch, tmp_path / str(run))
+        made.append(reference_views(scene, (view,), seed=seed, noise_target=0.0, max_samples=64)[0])
+    assert same(made[0], made[1])
+    assert not np.array_equal(made[0].irradiance_a, made[2].irradiance_a)
+    assert np.array_equal(made[0].direct_irradiance, made[2].direct_irradiance)
+
+
+def test_sampling_stops_at_the_noise_target(shapes):
+    scene, view = shapes.box_room(), shapes.box_room_view()
+    by_target = {
+        target: reference_views(scene, (view,), noise_target=target, max_samples=2048)[0]
+        for target in (1e-2, 1e-3)
+    }
+    assert by_target[1e-2].samples < by_target[1e-3].samples
+    for target, got in by_target.items():
+        assert noise_floor(got) <= target
+    capped = reference_views(scene, (view,), noise_target=0.0, max_samples=100)[0]
+    assert capped.samples == 100
+
+
+def test_noise_floor_is_the_error_of_the_mean(shapes):
+    """Against far more samples, the relMSE of the mean is what the halves alone foretell."""
+    scene, view = shapes.box_room(), shapes.box_room_view()
+    truth = reference_views(scene, (view,), seed=1, noise_target=0.0, max_samples=4096)[0]
+    valid = truth.valid
+    scale = truth.irradiance[valid] ** 2 + 0.01 * truth.irradiance[valid].mean() ** 2
+    measured, foretold = [], []
+    for seed in range(2, 10):
+        got = reference_views(scene, (view,), seed=seed, noise_target=0.0, max_samples=32)[0]
+        measured.append(np.mean((got.irradiance - truth.irradiance)[valid] ** 2 / scale))
+        foretold.append(noise_floor(got))
+    # The mean over eight seeds and 500 pixels; both scatter by some 10 %.
+    assert np.mean(measured) == pytest.approx(np.mean(foretold), rel=0.25)
+
+
+def test_halves_are_independent(shapes):
+    """The errors of A and B, over pixels and seeds, do not go together."""
+    scene, view = shapes.box_room(), shapes.box_room_view((16, 12))
+    truth = reference_views(scene, (view,), seed=1, noise_target=0.0, max_samples=4096)[0]
+    errors = []
+    for seed in range(2, 12):
+        got = reference_views(scene, (view,), seed=seed, noise_target=0.0, max_samples=16)[0]
+        errors.append(
+            [(half - truth.irradiance)[truth.valid][:, 1] for half in (got.irradiance_a, got.irradiance_b)]
+        )
+    a, b = np.array(errors).transpose(1, 0, 2).reshape(2, -1)
+    # 1,500 pairs: a correlation of independent numbers stays within 4/√1500.
+    assert abs(np.corrcoef(a, b)[0, 1]) < 4.0 / np.sqrt(a.size)
+
+
+@pytest.mark.parametrize("factor", [0.01, 0.1, 10.0, 100.0])
+def test_scale_changes_nothing(shapes, factor):
+    scene, view = shapes.box_room(), shapes.box_room_view()
+    base = reference_views(scene, (view,), noise_target=0.0, max_samples=64)[0]
+    other = reference_views(
+        scaled(scene, factor), (scaled_view(view, factor),), noise_target=0.0, max_samples=64
+    )[0]
+    assert np.array_equal(base.valid, other.valid)
+    # The same rays but for rounding in the last place, which lets a sample or two see past an edge.
+    for name in ("irradiance_a", "irradiance_b", "direct_irradiance"):
+        error = np.abs(getattr(other, name) - getattr(base, name)) / (base.irradiance.mean())
+        assert np.mean(error) < 1e-4, name
+    np.testing.assert_allclose(other.position_world, base.position_world * factor, atol=1e-5 * factor)
+
+
+def test_kept_references_are_found_without_mitsuba(shapes, monkeypatch, tmp_path):
+    no_cache(monkeypatch, tmp_path)
+    scene, view = shapes.box_room(), shapes.box_room_view((8, 6))
+    arguments = {"noise_target": 0.0, "max_samples": 16}
+    made = reference_views(scene, (view,), **arguments)[0]
+    monkeypatch.setattr("tuner.reference.references._rendered", None)
+    assert same(made, reference_views(scene, (view,), **arguments)[0])
+    # Names are no part of what a reference is made from.
+    renamed = replace(scene, name="another name")
+    assert same(made, reference_views(renamed, (replace(view, name="other"),), **arguments)[0])
+
+
+def test_anything_that_matters_makes_another_reference(shapes, monkeypatch, tmp_path):
+    no_cache(monkeypatch, tmp_path)
+    scene, view = shapes.box_room(), shapes.box_room_view((8, 6))
+    made = []
+
+    def counted(scene, view, *rest):
+        made.append(view)
+        return ReferenceView(
+            **{name: np.zeros((6, 8, 3), np.float32) for name in PICTURES}
+            | {"position_world": np.zeros((6, 8, 3)), "valid": np.zeros((6, 8), bool), "samples": 1}
+        )
+
+    monkeypatch.setattr("tuner.reference.references._rendered", counted)
+    mesh = scene.meshes[0]
+    moved = mesh.positions.copy()
+    moved[0, 0] = np.nextafter(moved[0, 0], np.float32(9.0))
+    brighter = replace(view.lights[0], intensity=view.lights[0].intensity * 2.0)
+    plain = {"seed": 0, "noise_target": 0.1, "max_samples": 4, "bounces": 1}
+    variations = [
+        (scene, view, {}),
+        (replace(scene, meshes=(replace(mesh, positions=moved), *scene.meshes[1:])), view, {}),
+        (replace(scene, materials=(shapes.gray(0.1), *scene.materials[1:])), view, {}),
+        (replace(scene, instances=scene.instances[:-1]), view, {}),
+        (scene, replace(view, lights=(brighter, *view.lights[1:])), {}),
+        (scene, replace(view, camera=replace(view.camera, yfov=0.5)), {}),
+        (scene, view, {"seed": 1}),
+        (scene, view, {"noise_target": 0.2}),
+        (scene, view, {"max_samples": 8}),
+        (scene, view, {"bounces": None}),
+    ]
+    for _ in range(2):
+        for changed_scene, changed_view, changes in variations:
+            reference_views(changed_scene, (changed_view,), **plain | changes)
+    assert len(made) == len(variations)
+
+
+@pytest.mark.parametrize("damage", ["truncated", "flipped", "empty"])
+def test_damaged_entries_are_made_again(shapes, monkeypatch, tmp_path, damage, caplog):
+    no_cache(monkeypatch, tmp_path)
+    scene, view = shapes.box_room(), shapes.box_room_view((8, 6))
+    arguments = {"noise_target": 0.0, "max_samples": 16}
+    made = reference_views(scene, (view,), **arguments)[0]
+    (entry,) = (tmp_path / "references").iterdir()
+    data = bytearray(entry.read_bytes())
+    if damage == "flipped":
+        data[len(data) // 2] ^= 1
+    entry.write_bytes({"truncated": data[: len(data) // 2], "flipped": data, "empty": b""}[damage])
+    assert same(made, reference_views(scene, (view,), **arguments)[0])
+    assert "damaged" in caplog.text
+    caplog.clear()
+    assert same(made, reference_views(scene, (view,), **arguments)[0])
+    assert not caplog.text
+
+
+def test_a_folder_that_cannot_be_written_is_no_error(shapes, monkeypatch, tmp_path, caplog):
+    (tmp_path / "file").write_text("in the way")
+    no_cache(monkeypatch, tmp_path / "file")
+    scene, view = shapes.box_room(), shapes.box_room_view((8, 6))
+    assert reference_views(scene, (view,), noise_target=0.0, max_samples=16)[0].samples == 16
+    assert "not kept" in caplog.text
+
+
+def test_old_entries_go_when_the_cache_is_full(shapes, monkeypatch, tmp_path):
+    no_cache(monkeypatch, tmp_path)
+    scene = shapes.box_room()
+    views = [shapes.box_room_view((8, 6 + k)) for k in range(3)]
+    for view in views:
+        reference_views(scene, (view,), noise_target=0.0, max_samples=1)
+    sizes = [path.stat().st_size for path in (tmp_path / "references").iterdir()]
+    monkeypatch.setattr(cache, "SIZE_LIMIT", max(sizes) * 2)
+    reference_views(scene, (shapes.box_room_view((8, 5)),), noise_target=0.0, max_samples=1)
+    assert len(list((tmp_path / "references").iterdir())) <= 2
+
+
+def test_progress_rises_to_one_and_an_interrupt_leaves_nothing(shapes, monkeypatch, tmp_path):
+    no_cache(monkeypatch, tmp_path)
+    scene = shapes.box_room()
+    views = tuple(shapes.box_room_view((8, 6 + k)) for k in range(2))
+    seen = []
+    arguments = {"noise_target": 0.0, "max_samples": 200}
+
+    def interrupted(name, share):
+        if share > 0.0:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        reference_views(scene, views, progress=interrupted, **arguments)
+    assert list((tmp_path / "references").iterdir()) == []
+    reference_views(scene, views, progress=lambda name, share: seen.append(share), **arguments)
+    assert seen == sorted(seen)
+    assert (seen[0], seen[-1]) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("bad", [{"max_samples": 0}, {"bounces": 0}, {"noise_target": -1.0}, {"seed": -1}])
+def test_arguments_out_of_range_are_refused(shapes, bad):
+    with pytest.raises(ValueError, match="must be at least"):
+        reference_views(shapes.box_room(), (shapes.box_room_view((8, 6)),), **bad)
+
+
+def test_scalar_fallback_agrees_within_noise(shapes, tmp_path):
+    """A process without LLVM traces the same rays: the same randomisation, so far closer than noise."""
+    scene, view = shapes.box_room(), shapes.box_room_view((16, 12))
+    arguments = {"seed": 3, "noise_target": 0.0, "max_samples": 32, "bounces": 2}
+    base = reference_views(scene, (view,), **arguments)[0]
+    (tmp_path / "job").write_bytes(pickle.dumps((scene, view, arguments)))
+    program = (
+        "import pickle, sys, numpy; from tuner.reference import *;"
+        "assert describe_variant().name == 'scalar_rgb';"
+        "scene, view, arguments = pickle.load(open(sys.argv[1], 'rb'));"
+        "r = reference_views(scene, (view,), **arguments)[0];"
+        "numpy.savez(sys.argv[2], direct=r.direct_irradiance, a=r.irradiance_a, b=r.irradiance_b)"
+    )
+    subprocess.run(
+        [sys.executable, "-W", "error", "-c", program, str(tmp_path / "job"), str(tmp_path / "made.npz")],
+        env=os.environ | {"VPLTUNE_MITSUBA_VARIANT": "scalar_rgb"},
+        check=True,
+        timeout=100,
+    )
+    with np.load(tmp_path / "made.npz") as made:
+        np.testing.assert_allclose(made["direct"], base.direct_irradiance, atol=1e-4)
+        mean = base.irradiance.mean()
+        for name, half in (("a", base.irradiance_a), ("b", base.irradiance_b)):
+            # Rounding lets a few of the 32 samples of a few pixels see past an edge.
+            assert np.mean(np.abs(made[name] - half)) < 0.005 * mean

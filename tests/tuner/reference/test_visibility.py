@@ -1,0 +1,66 @@
+"""Ray-traced visibility against an occluder whose shadow is known."""
+
+import numpy as np
+import pytest
+
+from renderer.scene import scaled
+from tuner.reference import ray_traced_visibility
+
+UP = np.array([0.0, 1.0, 0.0])
+
+
+@pytest.fixture
+def screen_between_floors(shapes):
+    """Floor at y = 0, ceiling at y = 2, and a screen at y = 1 that covers x > 0."""
+    return shapes.scene_of(
+        [
+            shapes.quad_mesh([-2, 0, -2], [0, 0, 4], [4, 0, 0], name="floor"),
+            shapes.quad_mesh([-2, 2, -2], [4, 0, 0], [0, 0, 4], name="ceiling"),
+            shapes.quad_mesh([0, 1, -2], [2, 0, 0], [0, 0, 4], name="screen"),
+        ],
+        [shapes.gray(0.5)],
+    )
+
+
+@pytest.mark.parametrize("factor", [0.01, 1.0, 100.0])
+def test_screen(screen_between_floors, factor):
+    rng = np.random.default_rng(0)
+    receivers = np.column_stack([rng.uniform(-2, 2, 500), np.zeros(500), rng.uniform(-2, 2, 500)])
+    vpls = np.column_stack([rng.uniform(-2, 2, 300), np.full(300, 2.0), rng.uniform(-2, 2, 300)])
+    crossing = (receivers[:, None, 0] + vpls[None, :, 0]) / 2.0
+    got = ray_traced_visibility(
+        scaled(screen_between_floors, factor),
+        (receivers * factor).astype(np.float32),
+        np.tile(UP, (500, 1)).astype(np.float32),
+        (vpls * factor).astype(np.float32),
+        np.tile(-UP, (300, 1)).astype(np.float32),
+    )
+    clear = np.abs(crossing) > 1e-3
+    assert np.array_equal(got[clear], (crossing < 0.0)[clear])
+
+
+def test_points_of_one_convex_room_see_each_other(shapes):
+    """No surface hides the points on it, however near they are to a corner."""
+    scene = shapes.scene_of(
+        [
+            shapes.quad_mesh([0, 0, 0], [0, 0, 1], [1, 0, 0], name="floor"),
+            shapes.quad_mesh([0, 0, 0], [0, 1, 0], [0, 0, 1], name="wall"),
+        ],
+        [shapes.gray(0.5)],
+    )
+    rng = np.random.default_rng(1)
+    near = 10.0 ** rng.uniform(-3, 0, 400)
+    floor = np.column_stack([near, np.zeros(400), rng.uniform(0.01, 0.99, 400)])
+    wall = np.column_stack([np.zeros(400), near, rng.uniform(0.01, 0.99, 400)])
+    got = ray_traced_visibility(scene, floor, np.tile(UP, (400, 1)), wall, np.tile([1.0, 0.0, 0.0], (400, 1)))
+    assert got.all()
+    # Turned away, neither sees the other.
+    assert not ray_traced_visibility(
+        scene, floor, np.tile(-UP, (400, 1)), wall, np.tile([1.0, 0.0, 0.0], (400, 1))
+    ).any()
+
+
+def test_nothing_asked_nothing_seen(screen_between_floors):
+    none, one = np.zeros((0, 3)), np.zeros((1, 3))
+    assert ray_traced_visibility(screen_between_floors, none, none, one, one).shape == (0, 1)
+    assert ray_traced_visibility(screen_between_floors, one, one, none, none).shape == (1, 0)

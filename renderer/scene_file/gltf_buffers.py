@@ -31,12 +31,12 @@ class GltfBuffers:
         stride = view.integer("byteStride", low=1, high=2**31) if "byteStride" in view.members else None
         if view.extension("EXT_meshopt_compression") is not None and self._is_placeholder(view):
             raise SceneFileError(
-                f"{view.where}: EXT_meshopt_compression is not read; store the file uncompressed or with Draco"
+                f"{view.where}: EXT_meshopt_compression is not read; store the scene plain or with Draco"
             )
         return self._slice(view), stride
 
     def _is_placeholder(self, view: JsonObject) -> bool:
-        """Whether the buffer is only a stand-in for what is decompressed (EXT_meshopt_compression: fallback)."""
+        """Whether the buffer only stands in for what would be decompressed (its key `fallback`)."""
         buffer = self._document.referred(view, "buffer", "buffers")
         extension = None if buffer is None else buffer.extension("EXT_meshopt_compression")
         return extension is not None and extension.boolean("fallback", False)

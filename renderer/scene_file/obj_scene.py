@@ -17,8 +17,8 @@ from renderer.scene_file.limits import DecodedBytes
 from renderer.scene_file.mtl_materials import MtlMaterials
 from renderer.scene_file.polygon_triangulation import triangulated
 from renderer.scene_file.scene_folder import SceneFolder
-from renderer.scene_file.srgb import linear_from_srgb
 from renderer.scene_file.surface import Surface, finished_mesh, used_vertices
+from renderer.srgb import linear_from_srgb
 
 # Grouping, levels of detail and display hints, none of which changes a surface.
 _SILENT_KEYWORDS = frozenset(

@@ -16,8 +16,8 @@ from renderer.scene_file.limits import DecodedBytes
 from renderer.scene_file.ply_data import PlyColumn, PlyData, PlyHeader, parse_ply_header
 from renderer.scene_file.polygon_triangulation import triangulated
 from renderer.scene_file.scene_folder import SceneFolder
-from renderer.scene_file.srgb import linear_from_srgb
 from renderer.scene_file.surface import Surface, finished_mesh
+from renderer.srgb import linear_from_srgb
 
 _UV_NAMES = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"))
 _COLOR_NAMES = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
@@ -75,6 +75,7 @@ def _surface(vertex: Columns, face: Columns, warnings: Warnings) -> Surface | No
         raise SceneFileError(f"element 'face': vertex indices must be below {len(positions)}, got {wrong}")
     triangles = _triangles(corners, indices.sizes, positions, warnings)
     normals = _stacked(vertex, ("nx", "ny", "nz"), "element 'vertex'")
+    normals = None if normals is None else normals.astype(np.float32)
     attributes = (normals, _uv(vertex), _colors(vertex, warnings))
     corner_uv = _corner_uv(face, indices.sizes)
     corner_colors = None if attributes[2] is not None else _colors(face, warnings)

@@ -55,7 +55,7 @@ class GltfDocument:
 
     root: JsonObject
     folder: SceneFolder
-    binary_chunk: bytes | None
+    binary_chunk: memoryview | None
     """The BIN chunk of a .glb."""
     warnings: Warnings
     decoded: DecodedBytes = field(default_factory=DecodedBytes)
@@ -104,7 +104,7 @@ def open_gltf(path: Path, warnings: Warnings) -> GltfDocument:
     return document
 
 
-def _glb_chunks(content: bytes) -> tuple[bytes, bytes | None]:
+def _glb_chunks(content: bytes) -> tuple[bytes, memoryview | None]:
     if len(content) < 20:
         raise SceneFileError(f"GLB header: must be at least 20 bytes, got {len(content)}")
     magic, version, length = struct.unpack_from("<4sII", content)
@@ -121,18 +121,18 @@ def _glb_chunks(content: bytes) -> tuple[bytes, bytes | None]:
     if end + 8 <= length:
         kind, binary_chunk, _ = _glb_chunk(content, end, length)
         if kind == _BINARY_CHUNK:
-            return json_chunk, binary_chunk
-    return json_chunk, None
+            return bytes(json_chunk), binary_chunk
+    return bytes(json_chunk), None
 
 
-def _glb_chunk(content: bytes, start: int, file_length: int) -> tuple[int, bytes, int]:
+def _glb_chunk(content: bytes, start: int, file_length: int) -> tuple[int, memoryview, int]:
     length, kind = struct.unpack_from("<II", content, start)
     end = start + 8 + length
     if end > file_length:
         raise SceneFileError(
             f"GLB chunk at byte {start}: says {length} bytes, but {max(file_length - start - 8, 0)} are left"
         )
-    return kind, content[start + 8 : end], end
+    return kind, memoryview(content)[start + 8 : end], end
 
 
 def _check_version(root: JsonObject) -> None:

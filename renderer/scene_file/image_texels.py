@@ -9,9 +9,16 @@ from jaxtyping import UInt8
 from PIL import Image
 
 from renderer.scene_file.diagnostics import SceneFileError
-from renderer.scene_file.limits import MAX_IMAGE_SIDE, MAX_IMAGE_TEXELS, MAX_SCENE_TEXELS
+from renderer.scene_file.limits import (
+    FREE_TEXELS,
+    MAX_IMAGE_SIDE,
+    MAX_IMAGE_TEXELS,
+    MAX_SCENE_TEXELS,
+    TEXELS_PER_BYTE,
+)
 
 GLTF_FORMATS = ("PNG", "JPEG", "WEBP")
+_STRIP_ROWS = 256
 MTL_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA")
 
 
@@ -20,7 +27,8 @@ class ImageDecoder:
 
     def __init__(self, formats: tuple[str, ...]) -> None:
         self._formats = formats
-        self._left = MAX_SCENE_TEXELS
+        self._texels = 0
+        self._bytes = 0
 
     def decode(self, content: bytes, where: str) -> UInt8[np.ndarray, "height width 3"]:
         """Texels, row 0 at the top; alpha, profiles, gamma and orientation are left aside, as glTF asks.
@@ -34,7 +42,7 @@ class ImageDecoder:
                 # PIL says things of odd headers and large sizes; the size is judged here.
                 warnings.simplefilter("ignore")
                 with Image.open(io.BytesIO(content), formats=self._formats) as image:
-                    self._check_size(image.size, where)
+                    self._check_size(image.size, len(content), where)
                     return _rgb(image)
         except SceneFileError:
             raise
@@ -49,24 +57,37 @@ class ImageDecoder:
             )
             raise SceneFileError(f"{where}: image {cause}") from error
 
-    def _check_size(self, size: tuple[int, int], where: str) -> None:
+    def _check_size(self, size: tuple[int, int], encoded: int, where: str) -> None:
         width, height = size
         if max(size) > MAX_IMAGE_SIDE or width * height > MAX_IMAGE_TEXELS:
             raise SceneFileError(
                 f"{where}: an image must be at most {MAX_IMAGE_SIDE} texels on a side and "
                 f"{MAX_IMAGE_TEXELS:,} in all, got {width} × {height}"
             )
-        if width * height > self._left:
+        self._texels += width * height
+        self._bytes += encoded
+        most = min(FREE_TEXELS + TEXELS_PER_BYTE * self._bytes, MAX_SCENE_TEXELS)
+        if self._texels > most:
             raise SceneFileError(
-                f"{where}: the images of a scene must have at most {MAX_SCENE_TEXELS:,} texels together"
+                f"{where}: the images of this scene must have at most {most:,} texels together, and with "
+                f"this one of {width} × {height} they have {self._texels:,}"
             )
-        self._left -= width * height
 
 
 def _rgb(image: Image.Image) -> UInt8[np.ndarray, "height width 3"]:
-    if image.mode.startswith("I") or image.mode == "F":
+    width, height = image.size
+    texels = np.empty((height, width, 3), np.uint8)
+    # Strip by strip: whole, PIL's conversions would hold a large image three times over.
+    for top in range(0, height, _STRIP_ROWS):
+        strip = image.crop((0, top, width, min(top + _STRIP_ROWS, height)))
+        texels[top : top + _STRIP_ROWS] = _strip_rgb(strip)
+    return texels
+
+
+def _strip_rgb(strip: Image.Image) -> UInt8[np.ndarray, "height width _"]:
+    if strip.mode.startswith("I") or strip.mode == "F":
         # Sixteen-bit grey. PIL's own conversion to eight bits clips where it should divide by 257.
-        grey = np.asarray(image, np.uint32)
-        texels = np.minimum((grey + 128) // 257, 255).astype(np.uint8)
-        return np.repeat(texels[:, :, None], 3, axis=2)
-    return np.array(image.convert("RGB"), np.uint8)
+        return ((np.clip(np.asarray(strip), 0, 65535).astype(np.uint32) + 128) // 257).astype(np.uint8)[
+            :, :, None
+        ]
+    return np.asarray(strip.convert("RGB"))

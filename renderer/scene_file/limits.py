@@ -13,7 +13,7 @@ MAX_JSON_VALUES = 2_000_000
 
 MAX_NODES = 1 << 17
 
-MAX_INSTANCES = 1 << 14
+MAX_INSTANCES = 10_000
 """Each is a draw call of its own in every pass."""
 
 MAX_IMAGE_SIDE = 16384
@@ -21,10 +21,15 @@ MAX_IMAGE_SIDE = 16384
 
 MAX_IMAGE_TEXELS = 1 << 26
 MAX_SCENE_TEXELS = 3 << 26
-"""Three bytes each. Both keep a small file that unpacks to a huge picture inside the gibibyte."""
+"""Three bytes each, and seven while an image is unpacked."""
+
+FREE_TEXELS = 1 << 26
+TEXELS_PER_BYTE = 64
+"""Beyond the free ones, texels must be paid for in bytes of image files: a photograph has two to ten
+to the byte, a kilobyte that unpacks to a megabyte has hundreds."""
 
 LARGEST_COORDINATE = 1e15
-"""The fourth power of a distance still fits a float32 after division by the scene's own length."""
+"""Its square still fits a float32, with eight decades to spare."""
 
 SMALLEST_EXTENT = 1e-15
 """A scene less wide than this has float32 areas that round to zero."""

@@ -46,7 +46,8 @@ for name in json.load(sys.stdin):
     # Python's own modules, loaded when first needed, are not the file's doing.
     outcome["opened_outside"] = [
         name for name in opened
-        if not os.path.realpath(name).startswith(folder + os.sep) and not name.endswith((".py", ".pyc", ".so"))
+        if not os.path.realpath(name).startswith(folder + os.sep)
+        and not name.endswith((".py", ".pyc", ".so"))
     ]
     print(json.dumps(outcome))
 """

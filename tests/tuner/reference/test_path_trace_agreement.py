@@ -36,8 +36,9 @@ def z_scores(mitsuba, shapes, scene: Scene, view: View, rounds: int):
     # Half the squared difference of two halves is, on average, the variance of one: here as a share of the
     # plain one, over the whole picture.
     own = ((ours.irradiance_a - ours.irradiance_b) * ours.albedo / np.pi)[valid] ** 2 / 4.0
-    # 1e-5 of the mean is below anything that a picture shows: for pixels that no plain path has lit.
-    variance = variance * (1.0 + own.sum() / variance.sum()) + (1e-5 * reflected.mean()) ** 2
+    # A ten-thousandth of the mean: for all but black pixels that a handful of plain paths have lit, if any,
+    # whose variance is therefore not known.
+    variance = variance * (1.0 + own.sum() / variance.sum()) + (1e-4 * reflected.mean()) ** 2
     return (plain - reflected) / np.sqrt(variance), plain.sum() / reflected.sum()
 
 
@@ -53,8 +54,8 @@ def check(scores: np.ndarray, ratio: float) -> None:
 @pytest.mark.parametrize(
     "kind",
     [
-        "spot",
         "all",
+        pytest.param("spot", marks=pytest.mark.slow),
         pytest.param("point", marks=pytest.mark.slow),
         pytest.param("sun", marks=pytest.mark.slow),
     ],
@@ -68,7 +69,7 @@ def test_box_room(mitsuba, shapes, kind):
 def test_textured_box_room(mitsuba, shapes):
     texels = np.random.default_rng(3).integers(0, 256, (5, 9, 3), dtype=np.uint8)
     view = shapes.box_room_view((40, 30), (shapes.point(),))
-    check(*z_scores(mitsuba, shapes, shapes.box_room(Texture("noise", texels)), view, rounds=3))
+    check(*z_scores(mitsuba, shapes, shapes.box_room(Texture("noise", texels)), view, rounds=2))
 
 
 def test_the_check_sees_what_is_wrong(mitsuba, shapes):

@@ -230,3 +230,28 @@ def test_scalar_fallback_agrees_within_noise(shapes, tmp_path):
         for name, half in (("a", base.irradiance_a), ("b", base.irradiance_b)):
             # Rounding lets a few of the 32 samples of a few pixels see past an edge.
             assert np.mean(np.abs(made[name] - half)) < 0.005 * mean
+
+
+def test_two_processes_make_a_reference_once(shapes, tmp_path):
+    """Both start at once on the same view; one renders, the other waits and finds it."""
+    (tmp_path / "job").write_bytes(pickle.dumps((shapes.box_room(), shapes.box_room_view((32, 24)))))
+    program = (
+        "import pickle, sys; from tuner.reference import references;"
+        "scene, view = pickle.load(open(sys.argv[1], 'rb')); render = references._rendered\n"
+        "def told(*rest):\n    print('rendered', flush=True)\n    return render(*rest)\n"
+        "references._rendered = told\n"
+        "references.reference_views(scene, (view,), noise_target=0.0, max_samples=1024)"
+    )
+    running = [
+        subprocess.Popen(
+            [sys.executable, "-c", program, str(tmp_path / "job")],
+            env=os.environ | {"VPLTUNE_CACHE": str(tmp_path / "cache")},
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for _ in range(2)
+    ]
+    said = "".join(process.communicate(timeout=100)[0] for process in running)
+    assert [process.returncode for process in running] == [0, 0]
+    assert said.count("rendered") == 1
+    assert [path.suffix for path in (tmp_path / "cache" / "references").iterdir()] == [".sha256"]

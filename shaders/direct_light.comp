@@ -60,7 +60,7 @@ void main() {
             vec3 to_light = towards_light(lights[i], receiver.position_world);
             float cosine = dot(receiver.normal_world, to_light);
             vec3 arriving = irradiance_facing(lights[i], receiver.position_world);
-            if (cosine > 0.0 && luminance(arriving) > 0.0) {
+            if (cosine > 0.0 && any(greaterThan(arriving, vec3(0.0)))) {
                 irradiance += arriving * (cosine * shadow(lights[i], receiver, to_light));
             }
         }

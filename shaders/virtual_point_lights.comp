@@ -58,10 +58,10 @@ void main() {
         float row_total = row_cdf[row * columns + columns - 1];
         int column = column_above(row, columns, point.x * row_total);
         RsmTexel texel = rsm_texel(ivec2(column, row));
-        float flux_luminance = luminance(texel.flux);
-        if (flux_luminance > 0.0) {
+        float texel_flux = mean_flux(texel.flux);
+        if (texel_flux > 0.0) {
             // N · p, with p = weight / total_weight the chance of this texel in one draw.
-            float draws = float(vpl_count) * pow(flux_luminance, density_exponent) / total_weight;
+            float draws = float(vpl_count) * pow(texel_flux, density_exponent) / total_weight;
             float area = texel.area / draws;
             vpl.position_footprint = vec4(texel.position_world, sqrt(area / PI));
             vpl.normal_area = vec4(texel.normal_world, area);

@@ -36,7 +36,7 @@ void main() {
         float weight = 0.0;
         if (column < columns) {
             RsmTexel texel = rsm_texel(ivec2(column, row));
-            float flux = luminance(texel.flux);
+            float flux = mean_flux(texel.flux);
             if (flux > 0.0) {
                 weight = pow(flux, density_exponent);
                 vec3 offset = texel.position_world - moment_origin;

@@ -40,3 +40,11 @@ def _outside_folder(variable: str, name: str) -> Path:
     if not folder.is_dir():
         pytest.skip(f"no folder {folder}; set {variable} to the folder of {name}")
     return folder
+
+
+@pytest.fixture(scope="session")
+def gl_context():
+    """One OpenGL context for the whole run: making one for each test takes longer than the tests."""
+    from renderer.gpu_context import create_context
+
+    return create_context()

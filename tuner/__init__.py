@@ -1,1 +1,1 @@
-"""The tuner: fits the runtime's parameters to a path tracer, by gradient descent."""
+"""Fits the artist parameters of virtual point lights to a path-traced reference."""

@@ -63,6 +63,7 @@ RsmTexel rsm_texel(ivec2 texel) {
     return result;
 }
 
-float luminance(vec3 rgb) {
-    return dot(rgb, vec3(0.2126, 0.7152, 0.0722)); // Rec. 709
+// Flux as one number: the mean of the channels, since error counts the same in each of them.
+float mean_flux(vec3 flux) {
+    return (flux.r + flux.g + flux.b) / 3.0;
 }

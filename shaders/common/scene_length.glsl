@@ -1,8 +1,8 @@
 // What the runtime measures of the light in the scene, every frame, on the GPU.
 
 layout(std430, binding = FRAME_STATISTICS_BINDING) buffer FrameStatistics {
-    float total_weight;   // sum over RSM texels of luminance(flux)^density_exponent
-    float total_flux;     // sum over RSM texels of luminance(flux) [W]
+    float total_weight;   // sum over RSM texels of mean_flux^density_exponent
+    float total_flux;     // sum over RSM texels of mean_flux [W]
     float scene_length;   // L: flux-weighted RMS distance of lit texels from their centroid [world units]
     float lit_texels;
 };

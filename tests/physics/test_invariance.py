@@ -1,0 +1,103 @@
+"""What must not change the picture: more VPLs, finer maps, more pixels, and the scene's scale."""
+
+import numpy as np
+import pytest
+
+from renderer.artist_parameters import ArtistParameters
+from renderer.runtime import Runtime
+from renderer.scene import Camera, look_at, scaled
+from renderer.tuned_config import TunedConfig
+from renderer.views import View, scaled_view
+
+from built_scenes import ROOM_LIGHTS, colored_room, room_view
+
+ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.15, 0.45))
+PARAMETERS = ArtistParameters(intensity=1.3, falloff_footprint=0.8, falloff_transmittance=0.3)
+
+
+def mean_irradiance(gl_context, view: View, vpl_count=1024, rsm_resolution=512) -> float:
+    parameters = ArtistParameters(vpl_count=vpl_count)
+    runtime = Runtime(
+        colored_room(), TunedConfig(parameters), context=gl_context, rsm_resolution=rsm_resolution
+    )
+    frames = [runtime.capture(view, rotation) for rotation in ROTATIONS]
+    return float(np.mean([frame.indirect_irradiance[frame.valid].mean() for frame in frames]))
+
+
+def inside_view(light: str, size=(64, 48)) -> View:
+    view = room_view(light, size)
+    camera = Camera(look_at(np.array([0.2, 0.1, 0.95]), np.array([0.0, -0.2, -1.0])), 1.0)
+    return View(view.name, view.split, size, camera, view.lights)
+
+
+@pytest.mark.parametrize("light", ROOM_LIGHTS)
+def test_mean_irradiance_is_stable(gl_context, light):
+    """Doubling the VPL count, the RSM resolution or the picture size moves the mean by less than 1 %.
+
+    The mean is over four rotations of the point table: the sun also lights the room from outside, and
+    how many of 1,024 VPLs fall inside is itself uncertain by about one percent.
+    The camera stands inside, so that a picture's edge is not the room's: a silhouette between two pixels
+    would move the mean of all seen by more.
+    """
+    base = mean_irradiance(gl_context, inside_view(light))
+    assert base > 0.0
+    more_vpls = mean_irradiance(gl_context, inside_view(light), vpl_count=2048)
+    finer_map = mean_irradiance(gl_context, inside_view(light), rsm_resolution=1024)
+    more_pixels = mean_irradiance(gl_context, inside_view(light, (128, 96)))
+    np.testing.assert_allclose(more_vpls, base, rtol=1e-2)
+    np.testing.assert_allclose(finer_map, base, rtol=1e-2)
+    np.testing.assert_allclose(more_pixels, base, rtol=1e-2)
+
+
+@pytest.mark.parametrize("factor", [0.01, 0.1, 10.0, 100.0])
+@pytest.mark.parametrize("light", ROOM_LIGHTS)
+def test_scale_changes_nothing(gl_context, light, factor):
+    """Scene, camera and light scaled together give the same picture from the same config, to 1e-3.
+
+    The bound is on the relative RMSE: where rounding moves a silhouette or a shadow's edge by a texel,
+    single pixels may differ.
+    """
+    view = room_view(light)
+    runtime = Runtime(colored_room(), TunedConfig(PARAMETERS), context=gl_context)
+    other = Runtime(scaled(colored_room(), factor), TunedConfig(PARAMETERS), context=gl_context)
+    picture, grown = runtime.render_radiance(view), other.render_radiance(scaled_view(view, factor))
+    error = np.sqrt(np.mean((grown - picture) ** 2) / np.mean(picture**2))
+    assert error < 1e-3
+    assert other.capture(scaled_view(view, factor)).scene_length == pytest.approx(
+        factor * runtime.capture(view).scene_length, rel=1e-3
+    )
+
+
+def test_no_absolute_length_in_a_shader():
+    """No number in a shader may be a length: a tiny or odd constant is one unless it is listed with its reason."""
+    from importlib import resources
+    import re
+
+    allowed = {
+        "1e-30",  # keeps a quotient finite at zero, far below any square of a length that float32 holds
+        "1e-12",  # a ratio of squared lengths
+        "1e-4",  # a cosine
+    }
+    number = re.compile(r"(?<![\w.])(?:\d+\.\d*|\.\d+|\d+)e-\d+")
+    for path in _shader_files(resources.files("shaders")):
+        code = re.sub(r"//.*", "", path.read_text(encoding="utf-8"))
+        for found in number.findall(code):
+            assert found in allowed, f"{path.name}: {found}"
+
+
+def _shader_files(folder):
+    for entry in folder.iterdir():
+        if entry.is_dir():
+            yield from _shader_files(entry)
+        elif entry.name.endswith((".comp", ".vert", ".frag", ".glsl")):
+            yield entry
+
+
+def test_frames_repeat_bitwise(gl_context):
+    """The same view drawn twice, another in between, is the same to the last bit."""
+    runtime = Runtime(colored_room(), "default", context=gl_context)
+    first = runtime.capture(room_view("spot"))
+    runtime.capture(room_view("directional"))
+    again = runtime.capture(room_view("spot"))
+    np.testing.assert_array_equal(again.indirect_irradiance, first.indirect_irradiance)
+    np.testing.assert_array_equal(again.vpl_position_world, first.vpl_position_world)

@@ -1,0 +1,127 @@
+"""Job one: a scene in, a tuned config and the proof of it out."""
+
+import importlib.metadata
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from renderer.artist_parameters import ArtistParameters
+from renderer.atomic_file import write_text_whole
+from renderer.errors import InputError
+from renderer.strict_json import strict_json
+from renderer.tuned_config import TunedConfig, write_config
+from renderer.views import write_views
+from tuner.comparison_picture import write_comparison
+from tuner.evaluate import SPLITS, EvaluatedView, Evaluation, evaluate
+from tuner.fit_falloff import fit_falloff
+from tuner.fit_result import FitResult
+from tuner.prepare_scene import PreparedScene, Progress, SceneOptions, Stopwatch, prepare_scene
+from tuner.reference.content_key import scene_digest
+
+PANEL_HEIGHT = 240
+"""Pixels; the panels of comparison.png are at least this high."""
+
+
+@dataclass(frozen=True, eq=False)
+class FitOptions(SceneOptions):
+    """`start`: where the fit begins, and what the parameters that are not fitted stay at."""
+
+    start: TunedConfig = field(default_factory=TunedConfig)
+
+
+@dataclass(frozen=True, eq=False)
+class SceneFit:
+    """What `fit_scene` made."""
+
+    config: TunedConfig
+    result: FitResult
+    evaluation: Evaluation
+    notes: tuple[str, ...]
+    document: dict[str, Any]
+    """What metrics.json holds, and `vpltune fit --json` prints."""
+
+
+def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Progress) -> SceneFit:
+    """Fit a scene and write tuned.json, views.json, metrics.json and comparison.png into `output`.
+
+    Every file is written whole, and only once the fit and its measurement are done. References are kept
+    in the user's cache as they are made, so a run that was stopped goes on where it was.
+
+    Raises:
+        InputError: the scene, its sidecar or the output folder cannot be used.
+        MachineError: no OpenGL.
+    """
+    watch = Stopwatch()
+    if output.exists() and not output.is_dir():
+        raise InputError(f"{output}: the output must be a folder, and is a file")
+    prepared = prepare_scene(scene_path, options, options.start, watch, progress)
+    fitted = tuple(view for view in prepared.views if view.view.split == "fitted")
+    with watch.stage("fit"):
+        tuned, result = fit_falloff(
+            fitted,
+            options.start.parameters,
+            seed=options.seed,
+            progress=lambda share: progress("fit", share),
+        )
+    with watch.stage("evaluate"):
+        evaluation = evaluate(
+            prepared.scene,
+            prepared.runtime,
+            prepared.views,
+            default_like(options.start.parameters),
+            tuned,
+            seed=options.seed,
+            progress=lambda share: progress("evaluate", share),
+        )
+    config = TunedConfig(tuned, _provenance(prepared, options, result))
+    write_views(output / "views.json", str(scene_path), tuple(view.view for view in prepared.views))
+    write_comparison(
+        output / "comparison.png", prepared.runtime, _first_of_each_split(evaluation), PANEL_HEIGHT
+    )
+    write_config(output / "tuned.json", config)
+    document = {
+        "scene": str(scene_path),
+        "parameters": tuned.as_dict(),
+        "views": str(output / "views.json"),
+        "metrics": evaluation.summary(),
+        "seconds": watch.report(),
+        "status": "failed" if result.status.failed else "ok",
+        "sentence": result.status.value,
+        "loss": {"start": result.start_loss, "end": result.loss, "steps": len(result.losses) - 1},
+        "ceiling_parameters": evaluation.ceiling_parameters.as_dict(),
+        "per_view": evaluation.per_view(),
+        "notes": list(prepared.notes),
+    }
+    write_text_whole(output / "metrics.json", strict_json(document) + "\n")
+    return SceneFit(config, result, evaluation, prepared.notes, document)
+
+
+def default_like(start: ArtistParameters) -> ArtistParameters:
+    """The defaults at the start's own cost: what is not fitted is the same in all that is compared."""
+    default = ArtistParameters()
+    return ArtistParameters(
+        intensity=default.intensity,
+        falloff_footprint=default.falloff_footprint,
+        falloff_transmittance=default.falloff_transmittance,
+        vpl_count=start.vpl_count,
+        density_exponent=start.density_exponent,
+    )
+
+
+def _provenance(prepared: PreparedScene, options: FitOptions, result: FitResult) -> dict[str, str | int | float]:
+    return {
+        "scene": prepared.scene.name,
+        "scene_sha256": scene_digest(prepared.scene),
+        "vpltune": importlib.metadata.version("vpltune"),
+        "mitsuba": importlib.metadata.version("mitsuba"),
+        "jax": importlib.metadata.version("jax"),
+        "views": options.views,
+        "seed": options.seed,
+        "bounces": options.bounces,
+        "fit": result.status.value,
+    }
+
+
+def _first_of_each_split(evaluation: Evaluation) -> tuple[EvaluatedView, ...]:
+    firsts = {view.view.view.split: view for view in reversed(evaluation.views)}
+    return tuple(firsts[split] for split in SPLITS if split in firsts)

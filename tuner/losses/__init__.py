@@ -1,0 +1,1 @@
+"""One loss family, one file."""

@@ -1,0 +1,81 @@
+"""How far a picture is from its reference: relMSE and energy of irradiance, HDR-FLIP of radiance."""
+
+from dataclasses import dataclass
+from statistics import fmean
+
+import flip_evaluator
+import numpy as np
+from jaxtyping import Bool, Float
+
+from tuner.losses.relative_squared_error import DARK_SHARE
+
+
+@dataclass(frozen=True)
+class ViewMetrics:
+    """Of one view, or the mean over several."""
+
+    relmse: float
+    """mean((y − r)²/(r² + 0.01·mean(r)²)) over valid pixels and channels; holds the reference's noise."""
+    energy_ratio: float
+    """mean(y)/mean(r) over valid pixels and channels."""
+    flip: float
+    """Mean HDR-FLIP (Andersson et al. 2021) of direct plus indirect radiance, in [0, 1]."""
+
+
+def relmse(picture: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:
+    """Relative mean squared error; 0 against a black reference if the picture is black, else infinite."""
+    y, r = picture.astype(np.float64), reference.astype(np.float64)
+    denominator = r**2 + DARK_SHARE * r.mean() ** 2 if r.size else r
+    if not denominator.any():
+        return 0.0 if not y.any() else float("inf")
+    return float(np.mean((y - r) ** 2 / denominator))
+
+
+def energy_ratio(picture: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:
+    """Mean of the picture over mean of the reference; 1 where both are black."""
+    y, r = float(picture.mean(dtype=np.float64)), float(reference.mean(dtype=np.float64))
+    if r > 0.0:
+        return y / r
+    return 1.0 if y == 0.0 else float("inf")
+
+
+def hdr_flip(
+    picture: Float[np.ndarray, "height width 3"], reference: Float[np.ndarray, "height width 3"]
+) -> float:
+    """Mean HDR-FLIP of two radiance pictures, its exposures chosen from the reference; 0 if both are black.
+
+    FLIP's exposures follow from the reference's brightest and median luminance, so both pictures are first
+    divided by the reference's mean: the result depends on neither light units nor scale.
+    """
+    level = float(reference.mean(dtype=np.float64))
+    if level <= 0.0:
+        return 0.0 if not picture.any() else 1.0
+    scaled = [np.ascontiguousarray(image / level, np.float32) for image in (reference, picture)]
+    with np.errstate(all="ignore"):
+        _, mean, _ = flip_evaluator.evaluate(scaled[0], scaled[1], "HDR", applyMagma=False)
+    return float(mean)
+
+
+def view_metrics(
+    irradiance: Float[np.ndarray, "height width 3"],
+    reference_irradiance: Float[np.ndarray, "height width 3"],
+    radiance: Float[np.ndarray, "height width 3"],
+    reference_radiance: Float[np.ndarray, "height width 3"],
+    valid: Bool[np.ndarray, "height width"],
+) -> ViewMetrics:
+    """All three figures of one view. Irradiance is that of one bounce, in W/m²; radiance is the whole
+    picture's, in W/(m² sr)."""
+    return ViewMetrics(
+        relmse=relmse(irradiance[valid], reference_irradiance[valid]),
+        energy_ratio=energy_ratio(irradiance[valid], reference_irradiance[valid]),
+        flip=hdr_flip(radiance, reference_radiance),
+    )
+
+
+def mean_metrics(metrics: list[ViewMetrics]) -> ViewMetrics:
+    """The mean of each figure over views."""
+    return ViewMetrics(
+        relmse=fmean(m.relmse for m in metrics),
+        energy_ratio=fmean(m.energy_ratio for m in metrics),
+        flip=fmean(m.flip for m in metrics),
+    )

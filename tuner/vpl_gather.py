@@ -1,0 +1,120 @@
+"""The VPL gather in JAX: the twin of shaders/vpl_gather.comp and shaders/common/vpl_irradiance.glsl.
+
+Keller 1997 (instant radiosity), with the point spread over its footprint: 1/d² becomes
+1/(d² + (αl)²), which for α = 1 is the exact form factor of a coaxial disc.
+"""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from tuner.virtual_point_lights import Receivers, VirtualPointLights
+
+RECEIVER_CHUNK = 512
+"""Receivers gathered at once: 512 × 1,024 pairs are 2 MiB an array, which stays in a core's cache."""
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class FalloffParameters:
+    """The continuous parameters of the gather; see `renderer.artist_parameters` for ranges and units."""
+
+    intensity: Float[Array, ""]
+    falloff_footprint: Float[Array, ""]
+    falloff_transmittance: Float[Array, ""]
+
+
+def vpl_irradiance(
+    position: Float[Array, "3"],
+    normal: Float[Array, "3"],
+    vpl: VirtualPointLights,
+    parameters: FalloffParameters,
+) -> Float[Array, "3"]:
+    """Irradiance of one VPL at one receiver, lengths in units of L. Twin: `vpl_irradiance` in GLSL."""
+    to_vpl = vpl.position - position
+    # 1e-30 keeps the quotient finite where receiver and VPL coincide; both cosines are 0 there.
+    distance_squared = jnp.maximum(jnp.dot(to_vpl, to_vpl), 1e-30)
+    cosine_receiver = jnp.maximum(jnp.dot(normal, to_vpl), 0.0)
+    cosine_vpl = jnp.maximum(-jnp.dot(vpl.normal, to_vpl), 0.0)
+    footprint = parameters.falloff_footprint * vpl.footprint
+    form = cosine_receiver * cosine_vpl / distance_squared / (distance_squared + footprint**2)
+    transmittance = jnp.exp(-parameters.falloff_transmittance * jnp.sqrt(distance_squared))
+    return vpl.flux * (parameters.intensity / jnp.pi * form * transmittance)
+
+
+def gather_pairwise(
+    receivers: Receivers, vpls: VirtualPointLights, parameters: FalloffParameters
+) -> Float[Array, "receivers 3"]:
+    """The gather as its definition reads, pair by pair: what `gather` is tested and timed against."""
+
+    def at(position: Float[Array, "3"], normal: Float[Array, "3"]) -> Float[Array, "3"]:
+        each = jax.vmap(vpl_irradiance, in_axes=(None, None, 0, None))
+        return each(position, normal, vpls, parameters).sum(axis=0)
+
+    return jax.vmap(at)(receivers.position, receivers.normal)
+
+
+def pair_geometry(
+    receivers: Receivers, vpls: VirtualPointLights
+) -> tuple[Float[Array, "receivers vpls"], Float[Array, "receivers vpls"]]:
+    """Squared distance and the product of both cosines for every pair, from matrix products alone.
+
+    |x − v|² = |x|² + |v|² − 2 x·v, and (v − x)·n = v·n − x·n: no array of [receivers, vpls, 3] is made.
+    """
+    highest = jax.lax.Precision.HIGHEST  # GPUs would otherwise multiply in TF32, with 10-bit mantissas
+    squared = (
+        jnp.sum(receivers.position**2, axis=1)[:, None]
+        + jnp.sum(vpls.position**2, axis=1)[None, :]
+        - 2.0 * jnp.matmul(receivers.position, vpls.position.T, precision=highest)
+    )
+    # The difference of sums cancels to rounding error, of either sign, where the pair nearly coincides.
+    squared = jnp.maximum(squared, 1e-12)
+    receiver_offset = jnp.sum(receivers.position * receivers.normal, axis=1)[:, None]
+    vpl_offset = jnp.sum(vpls.position * vpls.normal, axis=1)[None, :]
+    towards_vpl = jnp.matmul(receivers.normal, vpls.position.T, precision=highest) - receiver_offset
+    towards_receiver = jnp.matmul(receivers.position, vpls.normal.T, precision=highest) - vpl_offset
+    # Cancellation can also push the product of cosines past d²; a cosine is at most 1.
+    cosines = jnp.maximum(towards_vpl, 0.0) * jnp.maximum(towards_receiver, 0.0)
+    return squared, jnp.minimum(cosines / squared, 1.0)
+
+
+def gather(
+    receivers: Receivers,
+    vpls: VirtualPointLights,
+    parameters: FalloffParameters,
+    visibility: Bool[Array, "receivers vpls"] | None = None,
+) -> Float[Array, "receivers 3"]:
+    """Indirect irradiance [W/m²] at every receiver from all VPLs.
+
+    Args:
+        receivers, vpls: in units of L (see `tuner.virtual_point_lights.gather_inputs`).
+        parameters: k, α, κ.
+        visibility: true where receiver and VPL see each other; None takes that for granted, as the
+            runtime does.
+    """
+    count = receivers.position.shape[0]
+    chunks = -(-count // RECEIVER_CHUNK)
+    padding = ((0, chunks * RECEIVER_CHUNK - count), (0, 0))
+
+    def chunked(values: Array) -> Array:
+        return jnp.pad(values, padding).reshape(chunks, RECEIVER_CHUNK, values.shape[1])
+
+    def gather_chunk(chunk: tuple[Array, Array, Array | None]) -> Array:
+        position, normal, visible = chunk
+        squared, cosines = pair_geometry(Receivers(position, normal), vpls)
+        footprint = parameters.falloff_footprint * vpls.footprint
+        transmittance = jnp.exp(-parameters.falloff_transmittance * jnp.sqrt(squared))
+        weight = cosines / (squared + footprint**2) * transmittance
+        if visible is not None:
+            weight = weight * visible
+        return jnp.matmul(weight, vpls.flux, precision=jax.lax.Precision.HIGHEST)
+
+    inputs = (
+        chunked(receivers.position),
+        chunked(receivers.normal),
+        None if visibility is None else chunked(visibility),
+    )
+    irradiance = jax.lax.map(gather_chunk, inputs).reshape(-1, 3)[:count]
+    return irradiance * (parameters.intensity / jnp.pi)

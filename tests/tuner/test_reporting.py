@@ -45,7 +45,7 @@ def test_the_metrics_table_shows_every_number():
     assert "0.0001" in rows["noise floor"]
 
 
-def test_the_parameters_table_has_units_and_meanings():
+def test_the_parameters_table_has_values_defaults_and_units():
     text = text_of(parameters_table(ArtistParameters(intensity=1.5).as_dict()))
     assert "1.5" in text
     assert "VPL footprints" in text

@@ -6,15 +6,15 @@ from typing import Any
 from renderer.artist_parameters import ARTIST_PARAMETERS
 
 ROWS = ("default", "tuned", "ceiling")
-SPLITS = {"fitted": "fitted views", "held_out": "held-out views"}
+SPLITS = {"fitted": "fitted", "held_out": "held out"}
 
 
 def metrics_table(metrics: Mapping[str, Any]) -> Any:
     """A rich table of relMSE, energy ratio and FLIP: default, tuned and ceiling, and the noise floor."""
     from rich.table import Table
 
-    table = Table(title="One-bounce irradiance against the path tracer", title_justify="left")
-    table.add_column("")
+    table = Table(title="Against the path tracer, on views fitted and views held out", title_justify="left")
+    table.add_column("", no_wrap=True)
     for label in SPLITS.values():
         for name in ("relMSE", "energy", "FLIP"):
             table.add_column(f"{label}\n{name}", justify="right")
@@ -31,16 +31,18 @@ def metrics_table(metrics: Mapping[str, Any]) -> Any:
 
 
 def parameters_table(parameters: Mapping[str, float | int]) -> Any:
-    """A rich table of the parameters with their units and meanings."""
+    """A rich table of the parameters, their defaults and units."""
     from rich.table import Table
 
     table = Table(title="Parameters", title_justify="left")
-    for heading, justify in (("", "left"), ("value", "right"), ("unit", "left"), ("what it does", "left")):
+    table.add_column("", no_wrap=True)
+    for heading, justify in (("value", "right"), ("default", "right"), ("unit", "left")):
         table.add_column(heading, justify=justify)
     for spec in ARTIST_PARAMETERS:
-        table.add_row(f"{spec.symbol}  {spec.name}", f"{parameters[spec.name]:.6g}", spec.unit, spec.meaning)
+        row = (f"{parameters[spec.name]:.4g}", f"{spec.default:.4g}", spec.unit)
+        table.add_row(f"{spec.symbol}  {spec.name}", *row, style="bold" if spec.fitted else "dim")
     return table
 
 
 def _number(value: Any) -> str:
-    return "–" if value is None else f"{value:.4g}"
+    return "–" if value is None else f"{value:.3g}"

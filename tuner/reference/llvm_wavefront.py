@@ -52,7 +52,8 @@ class LlvmWavefront:
         found = self._scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         hit = active & found.is_valid()
         triangle = dr.select(hit, found.prim_index, mi.UInt32(0))
-        return hit, triangle, found.prim_uv.x, found.prim_uv.y
+        # What a miss leaves in the coordinates is not defined.
+        return hit, triangle, dr.select(hit, found.prim_uv.x, 0.0), dr.select(hit, found.prim_uv.y, 0.0)
 
     def occluded(self, origin: Vector, direction: Vector, max_t: Array, active: Array) -> Array:
         """Whether anything stands within `max_t` lengths of `direction`."""

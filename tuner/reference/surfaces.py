@@ -86,7 +86,11 @@ class Surfaces:
         upper, lower, along_v = self._texel_pair(v, w.to_number(height), wrap_v)
 
         def texel(column, line):
-            packed = w.take(self._texels, first + w.to_index(line) * width + w.to_index(column))
+            # The last texel at most, compared as integers: a coordinate so large that its fraction is not a
+            # number must not read outside the table.
+            column = w.minimum(w.to_index(column), width - 1)
+            line = w.minimum(w.to_index(line), height - 1)
+            packed = w.take(self._texels, first + line * width + column)
             return w.vector(*(w.take(self._linear, (packed >> shift) & 255) for shift in (0, 8, 16)))
 
         top = texel(left, upper) * (1.0 - along_u) + texel(right, upper) * along_u
@@ -107,8 +111,6 @@ class Surfaces:
         def wrapped(texel):
             around = texel - size * period * w.floor(texel / (size * period))
             around = w.where(around >= size, 2.0 * size - 1.0 - around, around)
-            # Also the guard against a coordinate that is not finite or too large for its texels.
-            inside = w.where(clamped, texel, around)
-            return w.minimum(w.maximum(inside, 0.0), size - 1.0)
+            return w.maximum(w.where(clamped, texel, around), 0.0)
 
         return wrapped(before), wrapped(before + 1.0), place - before

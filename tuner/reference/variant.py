@@ -141,7 +141,7 @@ def _probed_variant(libraries: list[str | None]) -> tuple[MitsubaVariant, bool]:
         MitsubaVariant(
             "scalar_rgb",
             None,
-            f"Mitsuba falls back to scalar_rgb, some 40 times slower: no LLVM library works here "
+            f"Mitsuba falls back to scalar_rgb, some 60 times slower: no LLVM library works here "
             f"(tried: {tried}); LLVM 19 does (Debian: apt-get install libllvm19).",
         ),
         certain,

@@ -237,3 +237,20 @@ def test_vertex_colours_multiply_the_base_colour(shapes):
     expected = (got.position_world + 1.0) / 2.0 * [0.5, 0.8, 0.0]
     np.testing.assert_allclose(got.albedo, expected, atol=1e-5)
     assert got.irradiance.max() == 0.0
+
+
+def test_misses_and_coordinates_without_a_fraction_read_inside_the_texture(shapes):
+    """A table read outside its bounds would end the process."""
+    texture = Texture("one", np.full((8, 8, 3), 255, np.uint8))
+    quad = shapes.quad_mesh([-1, -1, 0], [2, 0, 0], [0, 2, 0])
+    for size in (1.0, 1e9, 3e38):
+        stretched = replace(quad, uv=((quad.uv * 2.0 - 1.0) * np.float32(size)).astype(np.float32))
+        scene = shapes.scene_of(
+            [stretched], [Material("white", np.ones(3, np.float32), 0)], [texture], name=f"uv {size}"
+        )
+        # Three quarters of the rays miss.
+        got = reference(scene, shapes.view_of((0, 0, 2), (0, 0, 0), [], (64, 64), 1.6), max_samples=4)
+        assert 0.1 < got.valid.mean() < 0.5
+        assert np.isfinite(got.albedo).all()
+        if size == 1.0:
+            np.testing.assert_allclose(got.albedo[got.valid], 1.0, rtol=1e-6)

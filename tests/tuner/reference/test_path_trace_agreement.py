@@ -36,9 +36,10 @@ def z_scores(mitsuba, shapes, scene: Scene, view: View, rounds: int):
     # Half the squared difference of two halves is, on average, the variance of one: here as a share of the
     # plain one, over the whole picture.
     own = ((ours.irradiance_a - ours.irradiance_b) * ours.albedo / np.pi)[valid] ** 2 / 4.0
-    # A ten-thousandth of the mean: for all but black pixels that a handful of plain paths have lit, if any,
-    # whose variance is therefore not known.
-    variance = variance * (1.0 + own.sum() / variance.sum()) + (1e-4 * reflected.mean()) ** 2
+    # A thousandth of the mean: for nearly black pixels that a handful of plain paths have lit, if any, whose
+    # variance is therefore not known. Plain means of 16 million samples, made once for three such pixels
+    # of godot-living-room, agreed with ours to 1 %, where 4,096 samples were at a quarter to a half of it.
+    variance = variance * (1.0 + own.sum() / variance.sum()) + (1e-3 * reflected.mean()) ** 2
     return (plain - reflected) / np.sqrt(variance), plain.sum() / reflected.sum()
 
 
@@ -116,5 +117,6 @@ def test_scenes_that_others_made(
         pytest.skip(f"no scene in {scenes_folder / name}")
     direction = np.array(direction) / np.linalg.norm(direction)
     light = shapes.spot(position_world=np.array(position, float), direction_world=direction)
-    view = shapes.view_of(eye, target, [light], (64, 48), np.radians(degrees))
-    check(*z_scores(mitsuba, shapes, read_scene(path), view, rounds=3))
+    view = shapes.view_of(eye, target, [light], (40, 30), np.radians(degrees))
+    # More than elsewhere: much of a furnished room is dark, where few plain paths find the light.
+    check(*z_scores(mitsuba, shapes, read_scene(path), view, rounds=10))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import moderngl
 import numpy as np
+from jaxtyping import Float64
 
 from renderer.light_faces import NEAR_PLANE
 from renderer.render_targets import GBuffer
@@ -36,13 +37,15 @@ class CameraUniforms:
         )
 
 
-def camera_uniforms(camera: Camera, size: tuple[int, int], scene_radius: float) -> CameraUniforms:
-    """The uniforms of `camera` for a picture of `size` = (width, height) pixels."""
+def camera_uniforms(
+    camera: Camera, size: tuple[int, int], bounds: Float64[np.ndarray, "2 3"]
+) -> CameraUniforms:
+    """The uniforms of `camera` for `size` = (width, height) pixels and a scene within `bounds`."""
     tan_half = math.tan(camera.yfov / 2.0)
     return CameraUniforms(
         camera_to_world=camera.to_world,
         world_to_camera=camera.world_to_camera,
         tan_half_fov=(tan_half * size[0] / size[1], tan_half),
-        near_plane=NEAR_PLANE * scene_radius,
+        near_plane=NEAR_PLANE * float(np.linalg.norm(bounds[1] - bounds[0])) / 2.0,
         eye_world=tuple(float(value) for value in camera.position_world),
     )

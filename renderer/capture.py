@@ -34,11 +34,12 @@ class CapturedFrame:
     """L: flux-weighted RMS distance of the lit RSM texels from their centroid."""
 
 
-def capture_frame(frame: Frame, view: View, near_plane: float) -> CapturedFrame:
+def capture_frame(frame: Frame, view: View) -> CapturedFrame:
     """Read back everything that `frame` holds of `view`, which it has just drawn."""
     depth_buffer = read_picture(frame.gbuffer.depth)
     valid = depth_buffer > 0.0
-    depth = np.divide(np.float32(near_plane), depth_buffer, out=np.zeros_like(depth_buffer), where=valid)
+    near_plane = np.float32(frame.camera(view).near_plane)
+    depth = np.divide(near_plane, depth_buffer, out=np.zeros_like(depth_buffer), where=valid)
     position = view.camera.position_world + ray_directions_world(view) * depth[..., None]
     vpls = np.frombuffer(frame.virtual_point_lights.virtual_point_lights.read(), np.float32).reshape(-1, 12)
     statistics = np.frombuffer(frame.virtual_point_lights.frame_statistics.read(), np.float32)

@@ -67,7 +67,7 @@ class Frame:
         table_rotation: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         """Draw `view` up to the irradiance buffers."""
-        camera = self._camera(view)
+        camera = self.camera(view)
         self._bind_lights(records)
         self._geometry.draw(camera, self.gbuffer)
         self._reflective_shadow_map.draw(self.rsm)
@@ -93,9 +93,9 @@ class Frame:
         """From radiance to the display picture."""
         self._tone_mapping.draw(self.radiance, exposure, self.display)
 
-    def _camera(self, view: View) -> CameraUniforms:
-        _, radius = self._scene.bounding_sphere()
-        return camera_uniforms(view.camera, self.size, radius)
+    def camera(self, view: View) -> CameraUniforms:
+        """The view's camera as the shaders know it."""
+        return camera_uniforms(view.camera, self.size, self._scene.bounds())
 
     def _bind_lights(self, records: LightRecords) -> None:
         size = max(1, len(records.lights)) * LIGHT_DTYPE.itemsize
@@ -111,4 +111,4 @@ class Frame:
 
 def frame_light_records(scene: SceneBuffers, view: View) -> LightRecords:
     """The view's lights as records for the scene as it stands."""
-    return light_records(view.lights, *scene.bounding_sphere())
+    return light_records(view.lights, scene.bounds())

@@ -1,4 +1,4 @@
-"""How lights become square RSM views: one face for a narrow spot or the sun, six for everything wider."""
+"""How lights become RSM views: one face for a narrow spot or the sun, six for everything wider."""
 
 import math
 from dataclasses import dataclass
@@ -21,10 +21,11 @@ LIGHT_DTYPE = np.dtype(
 FACE_DTYPE = np.dtype(
     [
         ("light_to_world", "f4", (4, 4)),
+        ("extent", "f4", 2),
+        ("near_or_range", "f4"),
         ("light", "i4"),
         ("orthographic", "i4"),
-        ("extent", "f4"),
-        ("near_or_range", "f4"),
+        ("padding", "i4", 3),
     ]
 )
 
@@ -58,12 +59,12 @@ class LightRecords:
     """A point near the light: sums of squared distances lose least precision from there."""
 
 
-def light_records(lights: tuple[Light, ...], center: Float64[np.ndarray, "3"], radius: float) -> LightRecords:
-    """Lay out lights and RSM faces for a scene within a sphere of `center` and `radius` (world units)."""
+def light_records(lights: tuple[Light, ...], bounds: Float64[np.ndarray, "2 3"]) -> LightRecords:
+    """Lay out lights and RSM faces for a scene within `bounds` (low and high corner, world units)."""
     records = np.zeros(len(lights), LIGHT_DTYPE)
     faces: list[np.ndarray] = []
     for index, light in enumerate(lights):
-        own = _faces(light, index, center, radius)
+        own = _faces(light, index, bounds)
         cos_inner, cos_outer = math.cos(light.inner_cone), math.cos(light.outer_cone)
         records[index] = (
             (*light.position_world, KIND_CODES[light.kind]),
@@ -73,29 +74,47 @@ def light_records(lights: tuple[Light, ...], center: Float64[np.ndarray, "3"], r
         )
         faces += own
     all_faces = np.array(faces, FACE_DTYPE) if faces else np.zeros(0, FACE_DTYPE)
-    origin = all_faces["light_to_world"][0, 3, :3] if faces else center
+    origin = all_faces["light_to_world"][0, 3, :3] if faces else bounds.mean(axis=0)
     return LightRecords(records, all_faces, tuple(float(value) for value in origin))
 
 
-def _faces(light: Light, index: int, center: np.ndarray, radius: float) -> list[np.ndarray]:
+def _faces(light: Light, index: int, bounds: np.ndarray) -> list[np.ndarray]:
     if light.kind == "directional":
-        rotation = _rotation_along(light.direction_world)
-        # One percent of room: geometry that touches the sphere must not fall on the tile's border.
-        extent = radius * 1.01
-        return [_face(rotation, center - light.direction_world * extent, index, 1, extent, 2.0 * extent)]
-    near = NEAR_PLANE * radius
+        return [_sun_face(light, index, bounds)]
+    near = NEAR_PLANE * float(np.linalg.norm(bounds[1] - bounds[0])) / 2.0
     if light.kind == "spot" and light.outer_cone <= WIDEST_SINGLE_FACE:
+        tan_outer = math.tan(light.outer_cone)
         rotation = _rotation_along(light.direction_world)
-        return [_face(rotation, light.position_world, index, 0, math.tan(light.outer_cone), near)]
+        return [_face(rotation, light.position_world, index, 0, (tan_outer, tan_outer), near)]
     rotations = _CUBE
     if light.kind == "spot":
         # No spot reaches behind itself: of its cube, the last face stays dark.
         rotations = _rotation_along(light.direction_world) @ _CUBE[:5]
-    return [_face(rotation, light.position_world, index, 0, 1.0, near) for rotation in rotations]
+    return [_face(rotation, light.position_world, index, 0, (1.0, 1.0), near) for rotation in rotations]
+
+
+def _sun_face(light: Light, index: int, bounds: np.ndarray) -> np.ndarray:
+    """An orthographic face that holds all of `bounds`, as seen along the light."""
+    rotation = _rotation_along(light.direction_world)
+    selector = np.array([[(corner >> axis) & 1 for axis in range(3)] for corner in range(8)])
+    corners = bounds[selector, np.arange(3)] @ rotation
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    # One percent of room, of the whole size: a flat scene has no depth, and what touches the bounds must
+    # not fall on a tile's border.
+    room = 0.01 * float(np.linalg.norm(high - low))
+    extent = (high - low) / 2.0 + room
+    front = (low + high) / 2.0
+    front[2] = high[2] + room
+    return _face(rotation, rotation @ front, index, 1, (extent[0], extent[1]), 2.0 * extent[2])
 
 
 def _face(
-    rotation: np.ndarray, position: np.ndarray, light: int, orthographic: int, extent: float, depth: float
+    rotation: np.ndarray,
+    position: np.ndarray,
+    light: int,
+    orthographic: int,
+    extent: tuple[float, float],
+    depth: float,
 ) -> np.ndarray:
     matrix = np.eye(4)
     matrix[:3, :3] = rotation

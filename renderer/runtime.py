@@ -10,7 +10,6 @@ from renderer.artist_parameters import ArtistParameters
 from renderer.capture import CapturedFrame, capture_frame, read_picture
 from renderer.frame import Frame, frame_light_records
 from renderer.gpu_context import check_errors, create_context
-from renderer.light_faces import NEAR_PLANE
 from renderer.scene import Scene
 from renderer.scene_buffers import SceneBuffers
 from renderer.tuned_config import TunedConfig, read_config
@@ -19,8 +18,11 @@ from renderer.views import View
 Layer = Literal["final", "direct", "indirect", "irradiance", "albedo", "normal", "depth"]
 LAYERS: tuple[Layer, ...] = get_args(Layer)
 
-RSM_RESOLUTION = 512
+RSM_RESOLUTION = 1024
 """Texels along the side of an RSM face: shadows come from the same map, which sets the number."""
+RSM_RESOLUTION_OF_MANY = 512
+"""The same where there are more than `FEW_FACES`: a point light has six."""
+FEW_FACES = 2
 
 _SHARES = {"direct": (1.0, 0.0), "indirect": (0.0, 1.0)}
 
@@ -42,7 +44,7 @@ class Runtime:
         scene: Scene,
         config: TunedConfig | str | Path = "default",
         *,
-        rsm_resolution: int = RSM_RESOLUTION,
+        rsm_resolution: int | None = None,
         context: moderngl.Context | None = None,
     ):
         loaded = config if isinstance(config, TunedConfig) else read_config(config)
@@ -102,8 +104,7 @@ class Runtime:
         placement of the VPLs.
         """
         frame = self._draw(view, table_rotation)
-        _, radius = self.scene_buffers.bounding_sphere()
-        captured = capture_frame(frame, view, NEAR_PLANE * radius)
+        captured = capture_frame(frame, view)
         check_errors(self._context, f"the buffers of view {view.name}")
         return captured
 
@@ -119,7 +120,8 @@ class Runtime:
             # One frame's targets at a time: pictures of many sizes must not add up in GPU memory.
             self._frames.clear()
             self._context.gc()
-            self._frames[key] = Frame(
-                self._context, self.scene_buffers, size, self._rsm_resolution, face_count, key[2]
-            )
+            resolution = self._rsm_resolution
+            if resolution is None:
+                resolution = RSM_RESOLUTION if face_count <= FEW_FACES else RSM_RESOLUTION_OF_MANY
+            self._frames[key] = Frame(self._context, self.scene_buffers, size, resolution, face_count, key[2])
         return self._frames[key]

@@ -36,7 +36,7 @@ class SceneBuffers:
     """Vertex, index, instance and command buffers of one scene, and its textures.
 
     An instance's transform may change between frames (`set_transform`); nothing else is precomputed
-    from it but the bounding sphere.
+    from it but the bounds.
     """
 
     def __init__(self, context: moderngl.Context, scene: Scene):
@@ -93,13 +93,15 @@ class SceneBuffers:
         self._transforms[instance] = to_world
         self._upload_instances()
 
-    def bounding_sphere(self) -> tuple[Float64[np.ndarray, "3"], float]:
-        """Centre and radius of a sphere around all instances as they stand, world units."""
+    def bounds(self) -> Float64[np.ndarray, "2 3"]:
+        """Low and high corner of a box around all instances as they stand, world units."""
+        return self._bounds
+
+    def _placed_bounds(self) -> Float64[np.ndarray, "2 3"]:
         selector = np.array([[(corner >> axis) & 1 for axis in range(3)] for corner in range(8)])
         corners = self._local_bounds[:, selector, np.arange(3)]
         placed = corners @ self._transforms[:, :3, :3].transpose(0, 2, 1) + self._transforms[:, None, :3, 3]
-        low, high = placed.min(axis=(0, 1)), placed.max(axis=(0, 1))
-        return (low + high) / 2.0, float(np.linalg.norm(high - low)) / 2.0
+        return np.stack([placed.min(axis=(0, 1)), placed.max(axis=(0, 1))])
 
     def _make_commands(self) -> list[DrawGroup]:
         scene = self._scene
@@ -132,6 +134,7 @@ class SceneBuffers:
         return DrawGroup(self._textures[texture], mirrored, first, count)
 
     def _upload_instances(self) -> None:
+        self._bounds = self._placed_bounds()
         records = np.zeros(len(self._transforms), _INSTANCE_DTYPE)
         # GLSL matrices are stored column by column.
         records["to_world"] = self._transforms.transpose(0, 2, 1)

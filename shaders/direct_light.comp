@@ -28,7 +28,7 @@ float shadow(Light light, Receiver receiver, vec3 to_light) {
     int face_index = face_towards(light, receiver.position_world);
     RsmFace face = rsm_faces[face_index];
     float depth = -world_to_face(face, receiver.position_world).z;
-    float texel_size = face.extent * (2.0 / RSM_RESOLUTION) * (face.orthographic != 0 ? 1.0 : depth);
+    float texel_size = max(face.extent.x, face.extent.y) * (2.0 / RSM_RESOLUTION) * (face.orthographic != 0 ? 1.0 : depth);
     float cosine = clamp(dot(receiver.normal_world, to_light), 0.0, 1.0);
     float sine = sqrt(1.0 - cosine * cosine);
     vec3 moved = receiver.position_world + receiver.normal_world * (NORMAL_BIAS * sine * texel_size);

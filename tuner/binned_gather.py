@@ -35,13 +35,17 @@ class BinnedGather:
     """The sums of many receivers over the grid, and the grid. Lengths in units of L."""
 
     irradiance: Float[Array, "receivers 3 nodes"]
-    """Φ cosθ_x cosθ_j / (π d²) with interpolation weights, summed over VPLs [W/m²]; node = distance · footprints + footprint."""
+    """Φ cosθ_x cosθ_j / (π d²) with interpolation weights, summed over VPLs [W/m²].
+
+    Nodes are ordered by distance, then footprint."""
     distance: Float[Array, "distances"]
     footprint: Float[Array, "footprints"]
 
 
 def bin_vpls(
-    receivers: Receivers, vpls: VirtualPointLights, visibility: Bool[np.ndarray, "receivers vpls"] | None = None
+    receivers: Receivers,
+    vpls: VirtualPointLights,
+    visibility: Bool[np.ndarray, "receivers vpls"] | None = None,
 ) -> BinnedGather:
     """Sum every receiver's VPLs onto the grid; done once for each placement of the VPLs.
 
@@ -79,9 +83,7 @@ def gather_binned(binned: BinnedGather, parameters: FalloffParameters) -> Float[
     softening = parameters.falloff_footprint * binned.footprint[None, :] / binned.distance[:, None]
     transmittance = jnp.exp(-parameters.falloff_transmittance * binned.distance)[:, None]
     falloff = (transmittance / (1.0 + softening**2)).ravel()
-    return parameters.intensity * jnp.matmul(
-        binned.irradiance, falloff, precision=jax.lax.Precision.HIGHEST
-    )
+    return parameters.intensity * jnp.matmul(binned.irradiance, falloff, precision=jax.lax.Precision.HIGHEST)
 
 
 def _grid(receivers: Receivers, vpls: VirtualPointLights) -> tuple[np.ndarray, np.ndarray]:

@@ -23,7 +23,7 @@ class CapturedView:
     reference: ReferenceView
     captured: CapturedFrame
     valid: Bool[np.ndarray, "height width"] = field(init=False)
-    """Where both the runtime and the reference see a surface: at silhouettes, rasteriser and ray may differ."""
+    """Where both runtime and reference see a surface: at silhouettes rasteriser and ray may differ."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "valid", self.captured.valid & self.reference.valid)

@@ -15,7 +15,9 @@ _CAPTION = 22
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 
-def write_comparison(path: Path, runtime: Runtime, views: tuple[EvaluatedView, ...], panel_height: int) -> None:
+def write_comparison(
+    path: Path, runtime: Runtime, views: tuple[EvaluatedView, ...], panel_height: int
+) -> None:
     """Write one row for each view: reference, default, tuned, ceiling.
 
     Pixels are repeated, never blended, until a panel is at least `panel_height` high.

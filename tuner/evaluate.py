@@ -17,8 +17,7 @@ from renderer.runtime import Runtime
 from renderer.scene import Scene
 from tuner.captured_view import CapturedView, runtime_irradiance
 from tuner.fit_falloff import fit_falloff
-from tuner.reference import noise_floor
-from tuner.reference.visibility_cache import cached_visibility
+from tuner.reference import noise_floor, ray_traced_visibility
 from tuner.view_metrics import ViewMetrics, mean_metrics, view_metrics
 from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_gather import FalloffParameters, gather
@@ -88,7 +87,7 @@ def evaluate(
     """Measure every view. `progress` is called with the share done, in [0, 1]."""
     visibilities = []
     for index, view in enumerate(views):
-        visibilities.append(cached_visibility(scene, view.captured))
+        visibilities.append(_visibility(scene, view))
         if progress is not None:
             progress(0.5 * (index + 1) / len(views))
     fitted = [i for i, view in enumerate(views) if view.view.split == "fitted"]
@@ -127,6 +126,17 @@ def _evaluate_view(
         for name, picture in pictures.items()
     }
     return EvaluatedView(view, pictures, metrics, noise_floor(view.reference))
+
+
+def _visibility(scene: Scene, view: CapturedView) -> Bool[np.ndarray, "receivers vpls"]:
+    captured = view.captured
+    return ray_traced_visibility(
+        scene,
+        captured.position_world[captured.valid].astype(np.float64),
+        captured.normal_world[captured.valid],
+        captured.vpl_position_world.astype(np.float64),
+        captured.vpl_normal_world,
+    )
 
 
 def surrogate_irradiance(

@@ -50,7 +50,9 @@ def fit(
     start_loss = float(jax.jit(loss)(point, data))
     best = (point, jnp.float32(start_loss))
     if not np.isfinite(start_loss):
-        return FitResult(np.asarray(point), start_loss, start_loss, np.array([start_loss]), FitStatus.NOT_FINITE)
+        return FitResult(
+            np.asarray(point), start_loss, start_loss, np.array([start_loss]), FitStatus.NOT_FINITE
+        )
     state, losses, status = optimizer.init(point), [np.array([start_loss])], FitStatus.STEP_LIMIT
     blocks = -(-steps // BLOCK)
     for block in range(blocks):

@@ -108,7 +108,9 @@ def default_like(start: ArtistParameters) -> ArtistParameters:
     )
 
 
-def _provenance(prepared: PreparedScene, options: FitOptions, result: FitResult) -> dict[str, str | int | float]:
+def _provenance(
+    prepared: PreparedScene, options: FitOptions, result: FitResult
+) -> dict[str, str | int | float]:
     return {
         "scene": prepared.scene.name,
         "scene_sha256": scene_digest(prepared.scene),

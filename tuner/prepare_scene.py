@@ -106,9 +106,7 @@ def prepare_scene(
     return PreparedScene(scene, runtime, captured, (*scene.warnings, *notes))
 
 
-def _views(
-    scene: Scene, scene_path: Path, options: SceneOptions
-) -> tuple[tuple[View, ...], tuple[str, ...]]:
+def _views(scene: Scene, scene_path: Path, options: SceneOptions) -> tuple[tuple[View, ...], tuple[str, ...]]:
     if options.fixed_views is not None:
         return options.fixed_views, ()
     camera, lights, notes = resolve_camera_and_lights(

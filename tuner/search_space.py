@@ -40,9 +40,7 @@ class SearchSpace:
             ]
         )
 
-    def parameters(
-        self, point: Float[np.ndarray, "parameters"], rest: ArtistParameters
-    ) -> ArtistParameters:
+    def parameters(self, point: Float[np.ndarray, "parameters"], rest: ArtistParameters) -> ArtistParameters:
         """The parameters at a point; those that are not fitted are taken from `rest`."""
         values = {}
         for spec, place in zip(self.specs, np.clip(np.asarray(point, np.float64), 0.0, 1.0), strict=True):

@@ -57,7 +57,7 @@ def gather_inputs(
             jnp.asarray(captured.normal_world.reshape(-1, 3)[selected], jnp.float32),
         ),
         VirtualPointLights(
-            # An empty RSM leaves its VPLs at the world's origin without flux: at the centre they harm nothing.
+            # An empty RSM leaves VPLs without flux at the world's origin: at the centre they harm nothing.
             jnp.asarray(np.where(lit[:, None], (vpl_position - center) / length, 0.0), jnp.float32),
             jnp.asarray(captured.vpl_normal_world, jnp.float32),
             jnp.asarray(captured.vpl_footprint / length, jnp.float32),

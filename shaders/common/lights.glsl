@@ -13,14 +13,15 @@ struct Light {
     ivec4 faces;                // first face, number of faces
 };
 
-// One square view of a light. A perspective face covers |x|, |y| <= extent at unit depth; an orthographic
-// one covers |x|, |y| <= extent in world units and depths in [0, range].
+// One view of a light, a tile of the atlas. A perspective face covers |xy| <= extent at unit depth; an
+// orthographic one covers |xy| <= extent in world units and depths in [0, range].
 struct RsmFace {
     mat4 light_to_world;  // rigid; looks along -Z
+    vec2 extent;
+    float near_or_range;  // perspective: near plane; orthographic: range
     int light;
     int orthographic;
-    float extent;
-    float near_or_range;  // perspective: near plane; orthographic: range
+    int padding[3];
 };
 
 layout(std430, binding = LIGHTS_BINDING) readonly buffer Lights {

@@ -36,7 +36,7 @@ RsmTexel rsm_texel(ivec2 texel) {
     RsmFace face = rsm_faces[face_index];
     Light light = lights[face.light];
     vec2 ndc = (vec2(texel - tile * RSM_RESOLUTION) + 0.5) * (2.0 / RSM_RESOLUTION) - 1.0;
-    float side = face.extent * (2.0 / RSM_RESOLUTION);
+    vec2 side = face.extent * (2.0 / RSM_RESOLUTION);
     float view_depth = rsm_view_depth(face, depth);
 
     float flux_factor; // solid angle, or area across the beam
@@ -45,14 +45,14 @@ RsmTexel rsm_texel(ivec2 texel) {
     if (face.orthographic != 0) {
         position_face = vec3(ndc * face.extent, -view_depth);
         to_light = vec3(0.0, 0.0, 1.0);
-        flux_factor = side * side;
+        flux_factor = side.x * side.y;
         result.area = flux_factor;
     } else {
         vec3 ray = vec3(ndc * face.extent, -1.0);
         float ray_length = length(ray);
         position_face = ray * view_depth;
         to_light = -ray / ray_length;
-        flux_factor = side * side / (ray_length * ray_length * ray_length);
+        flux_factor = side.x * side.y / (ray_length * ray_length * ray_length);
         result.area = flux_factor * dot(position_face, position_face);
     }
     mat3 rotation = mat3(face.light_to_world);

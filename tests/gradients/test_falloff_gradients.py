@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from built_scenes import ROOM_LIGHTS, colored_room, room_view
 
 from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
@@ -12,8 +13,6 @@ from tuner.losses.relative_squared_error import relative_squared_error, target_o
 from tuner.search_space import SearchSpace
 from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_gather import FalloffParameters, gather
-
-from built_scenes import ROOM_LIGHTS, colored_room, room_view
 
 START = ArtistParameters(intensity=1.4, falloff_footprint=0.7, falloff_transmittance=0.6, vpl_count=256)
 STEP = {"intensity": 0.05, "falloff_footprint": 0.05, "falloff_transmittance": 0.05}
@@ -55,7 +54,7 @@ def test_binned_gradient_follows_the_full_gather(gl_context):
     receivers, vpls = gather_inputs(captured)
     binned = bin_vpls(receivers, vpls)
     truth = np.asarray(gather(receivers, vpls, FalloffParameters(*map(jnp.float32, (0.9, 0.4, 0.3)))))
-    target = target_of([(truth, truth)])
+    target = target_of(truth, truth)
     space = SearchSpace()
 
     def loss(point, picture_of):

@@ -3,6 +3,8 @@
 import jax
 import numpy as np
 import pytest
+from built_scenes import ROOM_LIGHTS, colored_room, room_view
+from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
 from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
@@ -14,9 +16,6 @@ from renderer.views import View
 from tuner.binned_gather import bin_vpls, gather_binned
 from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_gather import FalloffParameters, gather, gather_pairwise
-
-from built_scenes import ROOM_LIGHTS, colored_room, room_view
-from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
 PARAMETERS = (
     ArtistParameters(),

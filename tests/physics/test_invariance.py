@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
+from built_scenes import ROOM_LIGHTS, colored_room, room_view
 
 from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
 from renderer.scene import Camera, look_at, scaled
 from renderer.tuned_config import TunedConfig
 from renderer.views import View, scaled_view
-
-from built_scenes import ROOM_LIGHTS, colored_room, room_view
 
 ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.15, 0.45))
 PARAMETERS = ArtistParameters(intensity=1.3, falloff_footprint=0.8, falloff_transmittance=0.3)
@@ -69,9 +68,9 @@ def test_scale_changes_nothing(gl_context, light, factor):
 
 
 def test_no_absolute_length_in_a_shader():
-    """No number in a shader may be a length: a tiny or odd constant is one unless it is listed with its reason."""
-    from importlib import resources
+    """No tiny constant in a shader may be a length: each one allowed is listed with what it is."""
     import re
+    from importlib import resources
 
     allowed = {
         "1e-30",  # keeps a quotient finite at zero, far below any square of a length that float32 holds

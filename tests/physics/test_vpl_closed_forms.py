@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
+from built_scenes import quad, scene_of
 
 from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
 from renderer.scene import Camera, Light, look_at
 from renderer.tuned_config import TunedConfig
 from renderer.views import View
-
-from built_scenes import quad, scene_of
 
 
 def runtime_of(scene, gl_context, **parameters) -> Runtime:
@@ -32,11 +31,11 @@ def test_one_vpl_is_a_coaxial_disc(gl_context):
     height = 2.0
     ceiling = quad((-0.2, height, -0.2), (0.4, 0, 0), (0, 0, 0.4), 0, "ceiling")
     floor = quad((-3, 0, -3), (0, 0, 6), (6, 0, 0), 0, "floor")
-    light = Light(
-        "spot", np.full(3, 10.0), np.array([0.0, 1.0, 0.0]), np.array([0.0, 1.0, 0.0]), 0.1, 0.15
-    )
+    light = Light("spot", np.full(3, 10.0), np.array([0.0, 1.0, 0.0]), np.array([0.0, 1.0, 0.0]), 0.1, 0.15)
     camera = Camera(look_at(np.array([0.0, 1.5, 0.001]), np.zeros(3)), 0.02)
-    runtime = runtime_of(scene_of([ceiling, floor], [(0.5, 0.5, 0.5)]), gl_context, vpl_count=1, falloff_footprint=1.0)
+    runtime = runtime_of(
+        scene_of([ceiling, floor], [(0.5, 0.5, 0.5)]), gl_context, vpl_count=1, falloff_footprint=1.0
+    )
     captured = runtime.capture(View("disc", "fitted", (8, 8), camera, (light,)))
     to_vpl = captured.vpl_position_world[0] - captured.position_world
     distance_squared = (to_vpl**2).sum(axis=-1)
@@ -62,13 +61,11 @@ def test_light_flux_is_all_accounted_for(gl_context):
     captured = runtime_of(scene_of(sides, [(0.5, 0.5, 0.5)]), gl_context).capture(
         View("box", "fitted", (8, 8), camera, (light,))
     )
-    np.testing.assert_allclose(
-        captured.vpl_flux.sum(axis=0), 0.5 * 4.0 * np.pi * light.intensity, rtol=1e-3
-    )
+    np.testing.assert_allclose(captured.vpl_flux.sum(axis=0), 0.5 * 4.0 * np.pi * light.intensity, rtol=1e-3)
 
 
 def test_sun_flux_is_irradiance_times_area(gl_context):
-    """A directional light gives a floor E⊥ · A · cosθ · ρ, whatever the angle (the cosine cancels texel by texel).
+    """A directional light gives a floor E⊥ · A · cosθ · ρ at any angle: the cosine cancels by texel.
 
     Tolerance 0.5 %: the floor's edge falls between texels.
     """
@@ -80,9 +77,7 @@ def test_sun_flux_is_irradiance_times_area(gl_context):
             scene_of([quad((-1, 0, -1), (0, 0, 2), (2, 0, 0))], [(0.5, 0.5, 0.5)]), gl_context
         )
         captured = runtime.capture(View("sun", "fitted", (8, 8), camera, (light,)))
-        np.testing.assert_allclose(
-            captured.vpl_flux.sum(axis=0), 2.0 * 4.0 * np.cos(tilt) * 0.5, rtol=5e-3
-        )
+        np.testing.assert_allclose(captured.vpl_flux.sum(axis=0), 2.0 * 4.0 * np.cos(tilt) * 0.5, rtol=5e-3)
 
 
 def corner_form_factor(distance: float, width: float, length: float) -> float:

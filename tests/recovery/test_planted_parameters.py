@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from built_scenes import colored_room, room_view
 
 from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
@@ -15,11 +16,7 @@ from tuner.search_space import SearchSpace
 from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_gather import FalloffParameters
 
-from built_scenes import colored_room, room_view
-
-PLANTED = ArtistParameters(
-    intensity=1.35, falloff_footprint=0.8, falloff_transmittance=0.7, vpl_count=256
-)
+PLANTED = ArtistParameters(intensity=1.35, falloff_footprint=0.8, falloff_transmittance=0.7, vpl_count=256)
 
 
 def drawn_by_the_runtime(runtime: Runtime, light: str, parameters: ArtistParameters) -> CapturedView:

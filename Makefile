@@ -10,7 +10,7 @@ PYTHON_STAMP := $(VENV)/.python-packages
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all bench lint clean requirements
+.PHONY: help setup demo test test-all bench lint clean requirements schema
 .DELETE_ON_ERROR:
 
 help: ## list the targets
@@ -40,6 +40,9 @@ requirements: setup ## pin every Python package anew, with hashes
 	@$(BIN)/pip-compile -q --upgrade --generate-hashes --extra dev --all-build-deps --strip-extras \
 	    --no-header --no-annotate --no-emit-options --no-emit-index-url --no-emit-trusted-host \
 	    --no-emit-find-links -o requirements.txt pyproject.toml
+
+schema: setup ## write configs/default.json and the JSON Schema anew from the parameter table
+	@$(BIN)/python scripts/make_config_files.py
 
 clean: ## remove the virtual environment and everything made
 	@rm -rf $(VENV) build dist out .pytest_cache .hypothesis .ruff_cache .import_linter_cache

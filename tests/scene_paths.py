@@ -1,24 +1,10 @@
-"""Where the scenes of tests and measurements lie."""
+"""Where the scenes of tests lie."""
 
 from pathlib import Path
 
-OWN_SCENES = tuple(sorted((Path(__file__).parent.parent / "configs" / "scenes").glob("*.glb")))
+from benchmarks.scene_library import OUTSIDE_SCENES, OWN_SCENES
 
-OUTSIDE_SCENES = {
-    "babylon-marble-tower": "marbleTower.gltf",
-    "bevy-cornellbox": "CornellBox.glb",
-    "bevy-depthoffieldexample": "DepthOfFieldExample.glb",
-    "bevy-irradiancevolumeexample": "IrradianceVolumeExample.glb",
-    "bevy-mixedlightingexample": "MixedLightingExample.gltf",
-    "cube2-steelribs": "steelribs.obj",
-    "godot-living-room": "living_room.glb",
-    "godot-zdm2": "zdm2.glb",
-    "kajiya-cornell-box": "scene.gltf",
-    "nvpro-cornellbox": "cornellBox.gltf",
-    "playcanvas-chess-board": "chess-board.glb",
-    "playcanvas-house": "house.glb",
-}
-"""Every scene of others that can be loaded: folder and file."""
+__all__ = ["OUTSIDE_SCENES", "OWN_SCENES", "outside_scene"]
 
 
 def outside_scene(scenes_folder: Path, name: str) -> Path:

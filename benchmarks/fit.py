@@ -1,0 +1,110 @@
+"""How long a fit takes: the shipped Cornell box with a cold and a warm reference cache, and one step."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from benchmarks.row import Row
+from benchmarks.scene_library import REPOSITORY
+from tuner.binned_gather import bin_vpls, gather_binned
+from tuner.losses.relative_squared_error import relative_squared_error, target_of
+from tuner.virtual_point_lights import Receivers, VirtualPointLights
+from tuner.vpl_gather import FalloffParameters, gather_pairwise
+
+COLD_LIMIT_S = 60.0
+WARM_LIMIT_S = 10.0
+RECEIVERS = 16_384
+VPLS = 1_024
+REPEATS = 20
+
+
+def rows(progress: Callable[[str, float], None]) -> list[Row]:
+    """`fit_cold_s`, `fit_warm_s`: the whole command, Python's start included. `step_vs_pairwise`: one value
+    and gradient of the loss for 16,384 receivers and 1,024 VPLs, binned against pair by pair."""
+    progress("fit", 0.0)
+    with tempfile.TemporaryDirectory() as folder:
+        cold = _fit_seconds(Path(folder))
+        progress("fit", 0.4)
+        warm = _fit_seconds(Path(folder))
+    progress("fit", 0.6)
+    binned, pairwise = _step_milliseconds()
+    progress("fit", 1.0)
+    return [
+        Row("fit_cold_s", cold, "s", "limit", COLD_LIMIT_S),
+        Row("fit_warm_s", warm, "s", "limit", WARM_LIMIT_S),
+        Row("step_vs_pairwise", binned, "ms", "pairwise step", pairwise),
+    ]
+
+
+def _fit_seconds(folder: Path) -> float:
+    """Wall time of `vpltune fit` on the Cornell box with its caches in `folder`."""
+    scene = REPOSITORY / "configs" / "scenes" / "cornell-box.glb"
+    command = [sys.executable, "-m", "tuner", "fit", str(scene), "-o", str(folder / "out"), "--json"]
+    started = time.perf_counter()
+    finished = subprocess.run(
+        command, env={**os.environ, "VPLTUNE_CACHE": str(folder / "cache")}, capture_output=True, check=True
+    )
+    seconds = time.perf_counter() - started
+    if json.loads(finished.stdout)["status"] != "ok":
+        raise RuntimeError(f"the fit did not end well: {finished.stdout.decode()}")
+    return seconds
+
+
+def _step_milliseconds() -> tuple[float, float]:
+    """Median milliseconds of one value and gradient, binned and pairwise, taken in turn."""
+    receivers, vpls = _corner(np.random.default_rng(0))
+    start = FalloffParameters(*map(jnp.float32, (1.0, 0.5, 0.1)))
+    binned = bin_vpls(receivers, vpls)
+    truth = np.asarray(gather_binned(binned, FalloffParameters(*map(jnp.float32, (0.8, 1.0, 0.3)))))
+    target = target_of(truth, truth)
+
+    def loss(parameters, picture_of, data):
+        return relative_squared_error(picture_of(data, parameters), target)
+
+    forms = {
+        "binned": (gather_binned, binned),
+        "pairwise": (lambda pair, parameters: gather_pairwise(*pair, parameters), (receivers, vpls)),
+    }
+    steps = {
+        name: (jax.jit(lambda p, d, f=picture: jax.value_and_grad(loss)(p, f, d)), data)
+        for name, (picture, data) in forms.items()
+    }
+    times: dict[str, list[float]] = {name: [] for name in steps}
+    for repeat in range(REPEATS):
+        for name, (step, data) in steps.items():
+            if name == "pairwise" and repeat % 5:
+                continue
+            started = time.perf_counter()
+            jax.block_until_ready(step(start, data))
+            times[name].append(1e3 * (time.perf_counter() - started))
+    # The first of each compiles.
+    return float(np.median(times["binned"][1:])), float(np.median(times["pairwise"][1:]))
+
+
+def _corner(random: np.random.Generator) -> tuple[Receivers, VirtualPointLights]:
+    """Receivers on a floor, VPLs on the two walls that meet it, all of size 2 L."""
+    floor = np.concatenate([random.uniform(0.0, 2.0, (RECEIVERS, 2)), np.zeros((RECEIVERS, 1))], axis=1)
+    wall = np.concatenate([np.zeros((VPLS, 1)), random.uniform(0.0, 2.0, (VPLS, 2))], axis=1)
+    on_other = np.arange(VPLS) % 2 == 1
+    wall[on_other] = wall[on_other][:, [1, 0, 2]]
+    normals = np.where(on_other[:, None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
+    flux = random.uniform(0.5, 1.5, (VPLS, 3)) / VPLS
+    footprint = np.sqrt(8.0 / VPLS / np.pi) * random.uniform(0.5, 2.0, VPLS)
+
+    def array(values: np.ndarray) -> jax.Array:
+        return jnp.asarray(values, jnp.float32)
+
+    up = np.tile([0.0, 0.0, 1.0], (RECEIVERS, 1))
+    return (
+        Receivers(array(floor), array(up)),
+        VirtualPointLights(array(wall), array(normals), array(footprint), array(flux)),
+    )

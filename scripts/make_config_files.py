@@ -1,0 +1,14 @@
+"""Write configs/default.json and the JSON Schema anew from the parameter table."""
+
+import json
+from pathlib import Path
+
+from renderer.atomic_file import write_text_whole
+from renderer.tuned_config import TunedConfig, config_schema, config_text
+
+CONFIGS = Path(__file__).resolve().parent.parent / "configs"
+
+if __name__ == "__main__":
+    write_text_whole(CONFIGS / "default.json", config_text(TunedConfig()))
+    schema = json.dumps(config_schema(), indent=2, ensure_ascii=False)
+    write_text_whole(CONFIGS / "tuned_config.schema.json", schema + "\n")

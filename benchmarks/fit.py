@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks.row import Row
 from benchmarks.scene_library import REPOSITORY
 from tuner.binned_gather import bin_vpls, gather_binned
-from tuner.losses.relative_squared_error import relative_squared_error, target_of
+from tuner.losses.relative_squared_error import target_of, weighted_squared_error
 from tuner.virtual_point_lights import Receivers, VirtualPointLights
 from tuner.vpl_gather import FalloffParameters, gather_pairwise
 
@@ -68,7 +68,7 @@ def _step_milliseconds() -> tuple[float, float]:
     target = target_of(truth, truth)
 
     def loss(parameters, picture_of, data):
-        return relative_squared_error(picture_of(data, parameters), target)
+        return weighted_squared_error(picture_of(data, parameters), target)
 
     forms = {
         "binned": (gather_binned, binned),

@@ -31,15 +31,10 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 
 
 def _rows_of(name: str, metrics: dict) -> list[Row]:
-    tuned = [
-        Row(f"{name}.{figure}", metrics["tuned"][figure], "1", "default", metrics["default"][figure])
-        for figure in FIGURES
+    tuned, default, ceiling = (metrics[variant] for variant in ("tuned", "default", "ceiling"))
+    return [
+        *(Row(f"{name}.{figure}", tuned[figure], "1", "default", default[figure]) for figure in FIGURES),
+        Row(f"{name}.ceiling.relmse", ceiling["relmse"], "1", "noise floor", metrics["noise_floor"]),
+        Row(f"{name}.ceiling.energy_ratio", ceiling["energy_ratio"], "1", "the reference", 1.0),
+        Row(f"{name}.ceiling.flip", ceiling["flip"], "1", "default", default["flip"]),
     ]
-    ceiling = [
-        Row(
-            f"{name}.ceiling.relmse", metrics["ceiling"]["relmse"], "1", "noise floor", metrics["noise_floor"]
-        ),
-        Row(f"{name}.ceiling.energy_ratio", metrics["ceiling"]["energy_ratio"], "1", "the reference", 1.0),
-        Row(f"{name}.ceiling.flip", metrics["ceiling"]["flip"], "1", "default", metrics["default"]["flip"]),
-    ]
-    return tuned + ceiling

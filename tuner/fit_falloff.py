@@ -12,17 +12,13 @@ from tuner.binned_gather import BinnedGather, bin_vpls, gather_binned
 from tuner.captured_view import CapturedView
 from tuner.fit import STEPS, fit
 from tuner.fit_result import FitResult, FitStatus
-from tuner.losses.mean_level_error import mean_level_error
-from tuner.losses.relative_squared_error import Target, relative_squared_error, target_of
+from tuner.losses.relative_squared_error import EVEN_SHARE, Target, target_of, weighted_squared_error
 from tuner.search_space import SearchSpace
 from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_gather import FalloffParameters
 
 Data = tuple[tuple[BinnedGather, Target], ...]
 
-MEAN_LEVEL_WEIGHT = 1.0
-"""Of the mean level beside relMSE. On five scenes 1 cost 1 to 8 % of relMSE and took the energy's error
-from 0.77–0.99 to 0.83–1.02 of the reference; 0 dims the picture, 3 costs three times as much."""
 RECEIVERS_PER_VIEW = 4096
 """Pixels of each view that the fit looks at: three parameters need no more, and memory stays bounded."""
 
@@ -34,6 +30,7 @@ def fit_falloff(
     seed: int = 0,
     steps: int = STEPS,
     visibility: tuple[Bool[np.ndarray, "receivers vpls"], ...] | None = None,
+    even_share: float = EVEN_SHARE,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[ArtistParameters, FitResult]:
     """The parameters that bring the views closest to their references, all views counting the same.
@@ -44,11 +41,12 @@ def fit_falloff(
         seed: of the choice of pixels.
         visibility: for each view, of every valid pixel and VPL; None takes all as visible, as the
             runtime does.
+        even_share: weight of plain squared error beside relMSE, see `tuner.losses`.
         progress: called with the share done, in [0, 1].
     """
     space = SearchSpace()
     data = tuple(
-        _binned_view(view, seed + index, None if visibility is None else visibility[index])
+        _binned_view(view, seed + index, even_share, None if visibility is None else visibility[index])
         for index, view in enumerate(views)
     )
     point = space.point(start)
@@ -61,14 +59,14 @@ def fit_falloff(
 
 
 def _binned_view(
-    view: CapturedView, seed: int, visibility: Bool[np.ndarray, "receivers vpls"] | None
+    view: CapturedView, seed: int, even_share: float, visibility: Bool[np.ndarray, "receivers vpls"] | None
 ) -> tuple[BinnedGather, Target]:
     pixels = view.fitted_pixels(RECEIVERS_PER_VIEW, seed)
     receivers, vpls = gather_inputs(view.captured, pixels)
     binned = bin_vpls(receivers, vpls, None if visibility is None else visibility[pixels])
     flat = np.flatnonzero(view.captured.valid.ravel())[pixels]
     halves = (view.reference.irradiance_a, view.reference.irradiance_b)
-    return binned, target_of(*(half.reshape(-1, 3)[flat] for half in halves))
+    return binned, target_of(*(half.reshape(-1, 3)[flat] for half in halves), even_share)
 
 
 @lru_cache
@@ -76,11 +74,9 @@ def _loss(space: SearchSpace) -> Callable[[Float[Array, "parameters"], Data], Fl
     # One function object for each space: the compiled fit is found again by it.
     def loss(point: Float[Array, "parameters"], data: Data) -> Array:
         parameters = FalloffParameters(**space.values(point))
-        total = jnp.float32(0.0)
-        for gather, target in data:
-            picture = gather_binned(gather, parameters)
-            total += relative_squared_error(picture, target)
-            total += MEAN_LEVEL_WEIGHT * mean_level_error(picture, target)
-        return total / len(data)
+        errors = [
+            weighted_squared_error(gather_binned(gather, parameters), target) for gather, target in data
+        ]
+        return sum(errors) / len(data)
 
     return loss

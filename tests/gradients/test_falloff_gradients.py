@@ -9,7 +9,7 @@ from built_scenes import ROOM_LIGHTS, colored_room, room_view
 from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
 from tuner.binned_gather import bin_vpls, gather_binned
-from tuner.losses.relative_squared_error import relative_squared_error, target_of
+from tuner.losses.relative_squared_error import target_of, weighted_squared_error
 from tuner.search_space import SearchSpace
 from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_gather import FalloffParameters, gather
@@ -58,7 +58,7 @@ def test_binned_gradient_follows_the_full_gather(gl_context):
     space = SearchSpace()
 
     def loss(point, picture_of):
-        return relative_squared_error(picture_of(FalloffParameters(**space.values(point))), target)
+        return weighted_squared_error(picture_of(FalloffParameters(**space.values(point))), target)
 
     point = jnp.asarray(space.point(START), jnp.float32)
     full = jax.grad(lambda p: loss(p, lambda q: gather(receivers, vpls, q)))(point)

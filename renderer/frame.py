@@ -1,4 +1,4 @@
-"""One frame, as the diagram has it: G-buffer ► RSM ► VPLs ► gather ► resolve ► tone curve."""
+"""One frame, as the diagram has it: G-buffer ► RSM ► VPLs ► gather ► filter ► resolve ► tone curve."""
 
 import moderngl
 import numpy as np
@@ -9,6 +9,7 @@ from renderer.camera_uniforms import CameraUniforms, camera_uniforms
 from renderer.light_faces import FACE_DTYPE, LIGHT_DTYPE, LightRecords, light_records
 from renderer.passes.direct_light import DirectLightPass
 from renderer.passes.geometry import GeometryPass
+from renderer.passes.interleaved_filter import InterleavedFilterPass
 from renderer.passes.material_resolve import MaterialResolvePass
 from renderer.passes.reflective_shadow_map import ReflectiveShadowMapPass
 from renderer.passes.tone_mapping import ToneMappingPass
@@ -18,8 +19,10 @@ from renderer.render_targets import (
     create_display_target,
     create_gbuffer,
     create_irradiance_target,
+    create_pixel_list,
     create_reflective_shadow_map,
 )
+from renderer.runtime_options import RuntimeOptions
 from renderer.scene_buffers import SceneBuffers
 from renderer.views import View
 
@@ -38,6 +41,7 @@ class Frame:
         rsm_resolution: int,
         face_count: int,
         vpl_count: int,
+        options: RuntimeOptions,
     ):
         self._context = context
         self._scene = scene
@@ -45,7 +49,8 @@ class Frame:
         self.gbuffer = create_gbuffer(context, size)
         self.rsm = create_reflective_shadow_map(context, rsm_resolution, face_count)
         self.direct_irradiance = create_irradiance_target(context, size)
-        self.indirect_irradiance = create_irradiance_target(context, size)
+        self.vpl_irradiance = create_irradiance_target(context, size)
+        self.indirect_irradiance = self.vpl_irradiance
         self.radiance = create_irradiance_target(context, size)
         self.display = create_display_target(context, size)
 
@@ -55,7 +60,12 @@ class Frame:
         self._reflective_shadow_map = ReflectiveShadowMapPass(context, scene)
         self.virtual_point_lights = VirtualPointLightsPass(context, self.rsm, vpl_count)
         self._direct_light = DirectLightPass(context, rsm_resolution)
-        self._vpl_gather = VplGatherPass(context)
+        self._vpl_gather = VplGatherPass(context, options.interleave)
+        self._interleaved_filter: InterleavedFilterPass | None = None
+        if options.interleave > 1:
+            self.interleaved_irradiance = create_irradiance_target(context, size)
+            self._pixel_list = create_pixel_list(context, size)
+            self._interleaved_filter = InterleavedFilterPass(context, options.interleave, refine=True)
         self._material_resolve = MaterialResolvePass(context)
         self._tone_mapping = ToneMappingPass(context)
 
@@ -75,9 +85,7 @@ class Frame:
             self.rsm, records.moment_origin, parameters.density_exponent, table_rotation
         )
         self._direct_light.draw(camera, self.gbuffer, self.rsm, len(view.lights), self.direct_irradiance)
-        self._vpl_gather.draw(
-            camera, self.gbuffer, self.virtual_point_lights.count, parameters, self.indirect_irradiance
-        )
+        self._gather(camera, parameters)
 
     def resolve(self, share: tuple[float, float], exposure: float | None) -> None:
         """From the irradiance buffers to radiance and the display picture.
@@ -96,6 +104,17 @@ class Frame:
     def camera(self, view: View) -> CameraUniforms:
         """The view's camera as the shaders know it."""
         return camera_uniforms(view.camera, self.size, self._scene.bounds())
+
+    def _gather(self, camera: CameraUniforms, parameters: ArtistParameters) -> None:
+        count, picture = self.virtual_point_lights.count, self.vpl_irradiance
+        if self._interleaved_filter is None:
+            self._vpl_gather.draw(camera, self.gbuffer, count, parameters, picture)
+            return
+        self._vpl_gather.draw(camera, self.gbuffer, count, parameters, self.interleaved_irradiance)
+        self._interleaved_filter.draw(
+            camera, self.gbuffer, self.interleaved_irradiance, picture, pixel_list=self._pixel_list
+        )
+        self._vpl_gather.refine(camera, self.gbuffer, count, parameters, self._pixel_list, picture)
 
     def _bind_lights(self, records: LightRecords) -> None:
         size = max(1, len(records.lights)) * LIGHT_DTYPE.itemsize

@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 
 import moderngl
+import numpy as np
 
+from renderer import buffer_bindings
 from renderer.gpu_context import check_errors, create_depth_texture
 
 
@@ -92,6 +94,29 @@ def create_reflective_shadow_map(
 def create_irradiance_target(context: moderngl.Context, size: tuple[int, int]) -> moderngl.Texture:
     """A float32 RGBA picture; alpha is 1 where the camera sees a surface."""
     return _nearest(context.texture(size, 4, dtype="f4"))
+
+
+@dataclass(frozen=True)
+class PixelList:
+    """Pixels that a pass leaves to another, counted on the GPU (shaders/common/pixel_list.glsl)."""
+
+    buffer: moderngl.Buffer
+    """The workgroups of an indirect dispatch, the count, and the pixels."""
+
+    def clear(self) -> None:
+        """Empty the list: no workgroup, and no pixel."""
+        self.buffer.write(_EMPTY_PIXEL_LIST)
+
+    def bind(self) -> None:
+        self.buffer.bind_to_storage_buffer(buffer_bindings.PIXEL_LIST)
+
+
+_EMPTY_PIXEL_LIST = np.array([0, 1, 1, 0], np.uint32).tobytes()
+
+
+def create_pixel_list(context: moderngl.Context, size: tuple[int, int]) -> PixelList:
+    """A list with room for every pixel of a picture of `size` = (width, height)."""
+    return PixelList(context.buffer(reserve=len(_EMPTY_PIXEL_LIST) + 4 * size[0] * size[1]))
 
 
 def create_display_target(context: moderngl.Context, size: tuple[int, int]) -> moderngl.Texture:

@@ -10,6 +10,7 @@ from renderer.artist_parameters import ArtistParameters
 from renderer.capture import CapturedFrame, capture_frame, read_picture
 from renderer.frame import Frame, frame_light_records
 from renderer.gpu_context import check_errors, create_context
+from renderer.runtime_options import RuntimeOptions
 from renderer.scene import Scene
 from renderer.scene_buffers import SceneBuffers
 from renderer.tuned_config import TunedConfig, read_config
@@ -23,6 +24,8 @@ RSM_RESOLUTION = 1024
 RSM_RESOLUTION_OF_MANY = 512
 """The same where there are more than `FEW_FACES`: a point light has six."""
 FEW_FACES = 2
+
+DEFAULT_OPTIONS = RuntimeOptions()
 
 _SHARES = {"direct": (1.0, 0.0), "indirect": (0.0, 1.0)}
 
@@ -43,11 +46,13 @@ class Runtime:
         self,
         scene: Scene,
         config: TunedConfig | str | Path = "default",
+        options: RuntimeOptions = DEFAULT_OPTIONS,
         *,
         rsm_resolution: int | None = None,
         context: moderngl.Context | None = None,
     ):
         loaded = config if isinstance(config, TunedConfig) else read_config(config)
+        self.options = options
         self.parameters: ArtistParameters = loaded.parameters
         self._context = create_context() if context is None else context
         self._rsm_resolution = rsm_resolution
@@ -123,5 +128,7 @@ class Runtime:
             resolution = self._rsm_resolution
             if resolution is None:
                 resolution = RSM_RESOLUTION if face_count <= FEW_FACES else RSM_RESOLUTION_OF_MANY
-            self._frames[key] = Frame(self._context, self.scene_buffers, size, resolution, face_count, key[2])
+            self._frames[key] = Frame(
+                self._context, self.scene_buffers, size, resolution, face_count, key[2], self.options
+            )
         return self._frames[key]

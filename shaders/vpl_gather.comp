@@ -1,10 +1,15 @@
-// VPL gather: indirect irradiance at every pixel from all VPLs, which pass through shared memory.
+// VPL gather: indirect irradiance at every pixel, VPLs passing through shared memory.
+// Interleaved sampling (Keller and Heidrich 2001): the pixels of an n×n block, n = INTERLEAVE, share the VPLs
+// out among themselves, n² times as bright. A workgroup takes pixels of one place in their blocks, so that all
+// of its pixels read the same VPLs (Segovia et al. 2006, done here by arithmetic on the pixel's index).
+// With LISTED_PIXELS, the pixels are those of the list, for which sharing did not do.
 #include "common/gbuffer.glsl"
 #include "common/scene_length.glsl"
 #include "common/virtual_point_lights.glsl"
 
 const float PI = 3.14159265358979;
 #include "common/vpl_irradiance.glsl"
+#include "common/pixel_list.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -19,28 +24,43 @@ uniform float intensity;
 uniform float falloff_footprint;
 uniform float falloff_transmittance;
 
+const int SUBSETS = INTERLEAVE * INTERLEAVE;
+
 shared VirtualPointLight batch[64];
 
+ivec2 own_pixel(int subset) {
+    if (LISTED_PIXELS != 0) {
+        return listed_pixel(gl_WorkGroupID.x * 64u + gl_LocalInvocationIndex);
+    }
+    ivec2 place = ivec2(subset % INTERLEAVE, subset / INTERLEAVE);
+    return ivec2(gl_GlobalInvocationID.xy) * INTERLEAVE + place;
+}
+
 void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    int subset = int(gl_WorkGroupID.z);
+    // A run of the R2 sequence is as evenly spread as its start, so each subset is a good set of VPLs.
+    int first = subset * vpl_count / SUBSETS;
+    int end = (subset + 1) * vpl_count / SUBSETS;
+    ivec2 pixel = own_pixel(subset);
     ivec2 size = imageSize(out_irradiance);
-    FalloffParameters parameters = FalloffParameters(intensity, falloff_footprint, falloff_transmittance);
-    Receiver receiver = gbuffer_receiver(min(pixel, size - 1));
+    FalloffParameters parameters =
+        FalloffParameters(intensity * float(SUBSETS), falloff_footprint, falloff_transmittance);
+    Receiver receiver = gbuffer_receiver(clamp(pixel, ivec2(0), size - 1));
     vec3 irradiance = vec3(0.0);
-    for (int start = 0; start < vpl_count; start += 64) {
+    for (int start = first; start < end; start += 64) {
         int lane = int(gl_LocalInvocationIndex);
-        if (start + lane < vpl_count) {
+        if (start + lane < end) {
             batch[lane] = virtual_point_lights[start + lane];
         }
         barrier();
-        int count = min(64, vpl_count - start);
+        int count = min(64, end - start);
         for (int i = 0; i < count; ++i) {
             irradiance += vpl_irradiance(
                 receiver.position_world, receiver.normal_world, batch[i], scene_length, parameters);
         }
         barrier();
     }
-    if (all(lessThan(pixel, size))) {
+    if (pixel.x >= 0 && all(lessThan(pixel, size))) {
         imageStore(out_irradiance, pixel, receiver.valid ? vec4(irradiance, 1.0) : vec4(0.0));
     }
 }

@@ -1,20 +1,26 @@
-"""VPL gather: indirect irradiance at every pixel from every VPL, in a compute shader."""
+"""VPL gather: indirect irradiance at every pixel in a compute shader, from every VPL or from its share."""
 
 import moderngl
 
 from renderer import buffer_bindings
 from renderer.artist_parameters import ArtistParameters
 from renderer.camera_uniforms import CameraUniforms
-from renderer.render_targets import GBuffer
+from renderer.render_targets import GBuffer, PixelList
 from renderer.shader_library import load_compute, set_uniforms
 
 
 class VplGatherPass:
-    """G-buffer, VPLs → indirect irradiance."""
+    """G-buffer, VPLs → indirect irradiance.
 
-    def __init__(self, context: moderngl.Context):
+    `interleave` n: each pixel of an n×n block gathers from its own n²-th part of the VPLs, n² times as
+    bright (Keller and Heidrich 2001). Such a picture is for the interleaved filter; 1 is the full gather.
+    """
+
+    def __init__(self, context: moderngl.Context, interleave: int = 1):
         self._context = context
-        self._program = load_compute(context, "vpl_gather", buffer_bindings.DEFINES)
+        self._interleave = interleave
+        self._program = self._load(interleave, listed_pixels=False)
+        self._listed_program = self._load(1, listed_pixels=True) if interleave > 1 else None
 
     def draw(
         self,
@@ -22,17 +28,54 @@ class VplGatherPass:
         gbuffer: GBuffer,
         vpl_count: int,
         parameters: ArtistParameters,
-        indirect_irradiance: moderngl.Texture,
+        irradiance: moderngl.Texture,
     ) -> None:
         """Gather from the VPLs that are bound."""
-        camera.bind_gbuffer(self._program, gbuffer, 0)
+        self._bind(self._program, camera, gbuffer, vpl_count, parameters, irradiance)
+        side = 8 * self._interleave
+        groups = (-(-irradiance.width // side), -(-irradiance.height // side))
+        self._program.run(*groups, self._interleave**2)
+        self._context.memory_barrier(self._context.TEXTURE_FETCH_BARRIER_BIT)
+
+    def refine(
+        self,
+        camera: CameraUniforms,
+        gbuffer: GBuffer,
+        vpl_count: int,
+        parameters: ArtistParameters,
+        pixel_list: PixelList,
+        irradiance: moderngl.Texture,
+    ) -> None:
+        """Gather in full at the listed pixels of an interleaved picture, and leave the others as they are."""
+        assert self._listed_program is not None, "a full gather has nothing to refine"
+        self._bind(self._listed_program, camera, gbuffer, vpl_count, parameters, irradiance)
+        pixel_list.bind()
+        self._listed_program.run_indirect(pixel_list.buffer)
+        self._context.memory_barrier(self._context.TEXTURE_FETCH_BARRIER_BIT)
+
+    def _load(self, interleave: int, listed_pixels: bool) -> moderngl.ComputeShader:
+        defines = {
+            **buffer_bindings.DEFINES,
+            "INTERLEAVE": interleave,
+            "LISTED_PIXELS": listed_pixels,
+        }
+        return load_compute(self._context, "vpl_gather", defines)
+
+    def _bind(
+        self,
+        program: moderngl.ComputeShader,
+        camera: CameraUniforms,
+        gbuffer: GBuffer,
+        vpl_count: int,
+        parameters: ArtistParameters,
+        irradiance: moderngl.Texture,
+    ) -> None:
+        camera.bind_gbuffer(program, gbuffer, 0)
         set_uniforms(
-            self._program,
+            program,
             vpl_count=vpl_count,
             intensity=parameters.intensity,
             falloff_footprint=parameters.falloff_footprint,
             falloff_transmittance=parameters.falloff_transmittance,
         )
-        indirect_irradiance.bind_to_image(0, read=False, write=True)
-        self._program.run(-(-indirect_irradiance.width // 8), -(-indirect_irradiance.height // 8))
-        self._context.memory_barrier(self._context.TEXTURE_FETCH_BARRIER_BIT)
+        irradiance.bind_to_image(0, read=False, write=True)

@@ -4,11 +4,13 @@ Every surface is two-sided and diffuse. Positions are in world units; nothing el
 is. Colours are linear reflectance or radiance in the Rec. 709 primaries unless a name says sRGB.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float32, Float64, Int32, UInt8
+
+from renderer.scene_animation import Animation, Skinning
 
 Wrap = Literal["repeat", "mirrored_repeat", "clamp_to_edge"]
 LightKind = Literal["spot", "point", "directional"]
@@ -53,6 +55,8 @@ class Mesh:
     triangles: Int32[np.ndarray, "triangles 3"]
     material: int
     """Index into `Scene.materials`."""
+    skinning: Skinning | None = None
+    """Where an animation bends the mesh; positions and normals are then those of the scene at rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +123,8 @@ class Scene:
     cameras: tuple[Camera, ...] = ()
     warnings: tuple[str, ...] = ()
     """One line for each thing in the file that is ignored or approximated."""
+    animation: Animation | None = None
+    """How it moves; everything else here is the scene at rest."""
 
     def triangle_count(self) -> int:
         return sum(len(self.meshes[instance.mesh].triangles) for instance in self.instances)
@@ -158,6 +164,44 @@ def transform_normals(
     mapped = normals.astype(np.float64) @ cofactors.T
     length = np.linalg.norm(mapped, axis=1, keepdims=True)
     return np.divide(mapped, length, out=np.zeros_like(mapped), where=length > 0.0)
+
+
+def trs_matrices(
+    translation: Float64[np.ndarray, "n 3"],
+    rotation: Float64[np.ndarray, "n 4"],
+    scale: Float64[np.ndarray, "n 3"],
+) -> Float64[np.ndarray, "n 4 4"]:
+    """translation · rotation · scale; quaternions (x, y, z, w) of any length but zero."""
+    x, y, z, w = (rotation / np.linalg.norm(rotation, axis=1, keepdims=True)).T
+    matrices = np.zeros((len(scale), 4, 4))
+    matrices[:, 0, :3] = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], axis=1)
+    matrices[:, 1, :3] = np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], axis=1)
+    matrices[:, 2, :3] = np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=1)
+    matrices[:, :3, :3] *= scale[:, None, :]
+    matrices[:, :3, 3] = translation
+    matrices[:, 3, 3] = 1.0
+    return matrices
+
+
+def without_scale(to_world: Float64[np.ndarray, "4 4"]) -> Float64[np.ndarray, "4 4"] | None:
+    """The rigid motion that keeps position, −Z direction and the plane of −Z and +Y.
+
+    Returns:
+        None where the matrix is so flat that it leaves no such plane.
+    """
+    depth = np.linalg.norm(to_world[:3, 2])
+    if not depth > 0.0:
+        return None
+    backward = to_world[:3, 2] / depth
+    right = np.cross(to_world[:3, 1], backward)
+    width = np.linalg.norm(right)
+    if not width > 0.0:
+        return None
+    rigid = np.eye(4)
+    rigid[:3, 0], rigid[:3, 2] = right / width, backward
+    rigid[:3, 1] = np.cross(backward, rigid[:3, 0])
+    rigid[:3, 3] = to_world[:3, 3]
+    return rigid
 
 
 def look_at(
@@ -206,6 +250,9 @@ def scaled(scene: Scene, factor: float) -> Scene:
         lights=tuple(scaled_light(light, factor) for light in scene.lights),
         cameras=tuple(scaled_camera(camera, factor) for camera in scene.cameras),
         warnings=scene.warnings,
+        animation=None
+        if scene.animation is None
+        else replace(scene.animation, root_to_world=grow @ scene.animation.root_to_world),
     )
 
 

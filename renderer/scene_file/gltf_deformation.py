@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int64
+from jaxtyping import Float32, Float64, Int32, Int64
 
 from renderer.scene_file.diagnostics import SceneFileError
 from renderer.scene_file.gltf_accessors import Elements, GltfAccessors
@@ -21,12 +21,19 @@ class Deformation:
     """Of the morph targets."""
     joint_to_world: Float64[np.ndarray, "joints 4 4"] | None = None
     """Each joint's world matrix times its inverse bind matrix; None without a skin."""
+    is_animated: bool = False
+    """Whether the joints move, so that the mesh must keep what it was before they bent it."""
 
 
 def read_deformation(
-    node: JsonObject, mesh: JsonObject, document: GltfDocument, nodes: GltfNodes, accessors: GltfAccessors
+    node: JsonObject,
+    mesh: JsonObject,
+    document: GltfDocument,
+    nodes: GltfNodes,
+    accessors: GltfAccessors,
+    moving_nodes: set[int],
 ) -> Deformation:
-    """The morph weights of a node (its own, else its mesh's) and the pose of its skin.
+    """The morph weights of a node (its own, else its mesh's) and the pose of its skin at rest.
 
     Raises:
         SceneFileError: a reference is out of range, or counts disagree.
@@ -37,20 +44,32 @@ def read_deformation(
     skin = document.referred(node, "skin", "skins")
     if skin is None:
         return Deformation(weights)
+    joints, inverse_bind = read_skin(skin, nodes, accessors)
+    to_world = np.stack([nodes.to_world(joint) for joint in joints]) @ inverse_bind
+    return Deformation(weights, to_world, any(joint in moving_nodes for joint in joints))
+
+
+def read_skin(
+    skin: JsonObject, nodes: GltfNodes, accessors: GltfAccessors
+) -> tuple[list[int], Float64[np.ndarray, "joints 4 4"]]:
+    """The nodes that are a skin's joints, and their inverse bind matrices.
+
+    Raises:
+        SceneFileError: no joint, one out of range, or fewer matrices than joints.
+    """
     joints = skin.indices("joints", len(nodes.nodes), "nodes")
     if not joints:
         raise SceneFileError(f"{skin.where}: must have at least one joint")
-    to_world = np.stack([nodes.to_world(joint) for joint in joints])
-    if "inverseBindMatrices" in skin.members:
-        inverse_bind = accessors.referred(skin, "inverseBindMatrices", ("MAT4",))
-        if len(inverse_bind) < len(joints):
-            raise SceneFileError(
-                f"{inverse_bind.where}: must have a matrix for each of {len(joints)} joints, "
-                f"got {len(inverse_bind)}"
-            )
-        stored = inverse_bind.as_floats(np.arange(len(joints)))
-        to_world = to_world @ stored.astype(np.float64).reshape(-1, 4, 4).transpose(0, 2, 1)
-    return Deformation(weights, to_world)
+    if "inverseBindMatrices" not in skin.members:
+        return joints, np.tile(np.eye(4), (len(joints), 1, 1))
+    inverse_bind = accessors.referred(skin, "inverseBindMatrices", ("MAT4",))
+    if len(inverse_bind) < len(joints):
+        raise SceneFileError(
+            f"{inverse_bind.where}: must have a matrix for each of {len(joints)} joints, "
+            f"got {len(inverse_bind)}"
+        )
+    stored = inverse_bind.as_floats(np.arange(len(joints))).astype(np.float64)
+    return joints, stored.reshape(-1, 4, 4).transpose(0, 2, 1)
 
 
 def morphed(
@@ -85,43 +104,47 @@ def morphed(
     return total.astype(np.float32)
 
 
-def skinned(
-    positions: Float32[np.ndarray, "n 3"],
-    normals: Float32[np.ndarray, "n 3"] | None,
-    attributes: dict[str, Elements],
-    used: Int64[np.ndarray, "n"],
-    joint_to_world: Float64[np.ndarray, "joints 4 4"],
-) -> tuple[Float32[np.ndarray, "n 3"], Float32[np.ndarray, "n 3"] | None]:
-    """Linear blend skinning into world space: each vertex under the weighted sum of its joints' matrices.
+def read_influences(
+    attributes: dict[str, Elements], used: Int64[np.ndarray, "n"], joint_count: int
+) -> tuple[Int32[np.ndarray, "n influences"], Float64[np.ndarray, "n influences"]]:
+    """The joints that each vertex follows, and how much: rows of weights sum to 1.
 
     Raises:
         SceneFileError: a joint out of range, a negative weight, or a vertex without any.
     """
-    blended = np.zeros((len(positions), 3, 4))
-    total = np.zeros(len(positions))
-    sets = [i for i in range(len(attributes)) if f"JOINTS_{i}" in attributes]
-    for i in sets:
+    joints: list[np.ndarray] = []
+    weights: list[np.ndarray] = []
+    for i in [i for i in range(len(attributes)) if f"JOINTS_{i}" in attributes]:
         if f"WEIGHTS_{i}" not in attributes:
             raise SceneFileError(f"{attributes[f'JOINTS_{i}'].where}: JOINTS_{i} must come with WEIGHTS_{i}")
-        joints = attributes[f"JOINTS_{i}"].stored[used].astype(np.int64)
-        weights = attributes[f"WEIGHTS_{i}"].as_floats(used).astype(np.float64)
-        if (
-            (joints < 0).any()
-            or (joints[weights > 0.0] >= len(joint_to_world)).any()
-            or (weights < 0.0).any()
-        ):
+        joints.append(attributes[f"JOINTS_{i}"].stored[used].astype(np.int64))
+        weights.append(attributes[f"WEIGHTS_{i}"].as_floats(used).astype(np.float64))
+        used_joints = joints[-1][weights[-1] > 0.0]
+        if (joints[-1] < 0).any() or (used_joints >= joint_count).any() or (weights[-1] < 0.0).any():
             raise SceneFileError(
-                f"{attributes[f'JOINTS_{i}'].where}: joints must be below {len(joint_to_world)}, "
+                f"{attributes[f'JOINTS_{i}'].where}: joints must be below {joint_count}, "
                 "and weights must not be negative"
             )
-        for k in range(joints.shape[1]):
-            chosen = np.minimum(joints[:, k], len(joint_to_world) - 1)
-            blended += weights[:, k, None, None] * joint_to_world[chosen, :3]
-            total += weights[:, k]
+    all_weights = np.concatenate(weights, axis=1)
+    total = all_weights.sum(axis=1, keepdims=True)
     if not (total > 0.0).all():
         raise SceneFileError(f"{attributes['JOINTS_0'].where}: every vertex must have a weight above zero")
-    # Weights stored in bytes do not quite sum to one.
-    blended /= total[:, None, None]
+    # A weight of zero may name any joint; weights stored in bytes do not quite sum to one.
+    chosen = np.minimum(np.concatenate(joints, axis=1), joint_count - 1).astype(np.int32)
+    return chosen, all_weights / total
+
+
+def skinned(
+    positions: Float32[np.ndarray, "n 3"],
+    normals: Float32[np.ndarray, "n 3"] | None,
+    joints: Int32[np.ndarray, "n influences"],
+    weights: Float64[np.ndarray, "n influences"],
+    joint_to_world: Float64[np.ndarray, "joints 4 4"],
+) -> tuple[Float32[np.ndarray, "n 3"], Float32[np.ndarray, "n 3"] | None]:
+    """Linear blend skinning into world space: each vertex under the weighted sum of its joints' matrices."""
+    blended = np.zeros((len(positions), 3, 4))
+    for k in range(joints.shape[1]):
+        blended += weights[:, k, None, None] * joint_to_world[joints[:, k], :3]
     placed = np.einsum("nij,nj->ni", blended[:, :, :3], positions.astype(np.float64)) + blended[:, :, 3]
     if normals is None:
         return placed.astype(np.float32), None

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from jaxtyping import Float64
 
-from renderer.scene import Camera, Light
+from renderer.scene import Camera, Light, without_scale
 from renderer.scene_file.diagnostics import SceneFileError, label
 from renderer.scene_file.gltf_document import GltfDocument
 from renderer.scene_file.json_object import JsonObject
@@ -35,7 +35,10 @@ def read_camera(
     yfov = perspective.number("yfov", low=0.0, high=math.pi)
     if not 0.0 < yfov < math.pi:
         raise SceneFileError(f"{perspective.at('yfov')}: must lie in (0, π) radians, got {yfov:g}")
-    return Camera(_without_scale(to_world, camera.where), yfov)
+    rigid = without_scale(to_world)
+    if rigid is None:
+        raise SceneFileError(f"{camera.where}: its node is scaled to nothing, which leaves it no direction")
+    return Camera(rigid, yfov)
 
 
 def read_light(
@@ -94,17 +97,6 @@ def _cone(light: JsonObject) -> tuple[float, float]:
             f"got {inner:g} and {outer:g}"
         )
     return inner, min(outer, math.pi / 2)
-
-
-def _without_scale(to_world: Float64[np.ndarray, "4 4"], where: str) -> Float64[np.ndarray, "4 4"]:
-    """The rigid motion that keeps position, view direction and the plane of view and up."""
-    backward = _unit(to_world[:3, 2], where)
-    up = to_world[:3, 1]
-    right = _unit(np.cross(up, backward), where)
-    rigid = np.eye(4)
-    rigid[:3, 0], rigid[:3, 1], rigid[:3, 2] = right, np.cross(backward, right), backward
-    rigid[:3, 3] = to_world[:3, 3]
-    return rigid
 
 
 def _unit(vector: Float64[np.ndarray, "3"], where: str) -> Float64[np.ndarray, "3"]:

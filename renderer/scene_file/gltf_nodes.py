@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import Float64
 
+from renderer.scene import trs_matrices
 from renderer.scene_file.diagnostics import SceneFileError
 from renderer.scene_file.gltf_document import GltfDocument
 from renderer.scene_file.json_object import JsonObject
@@ -18,8 +19,8 @@ class GltfNodes:
             raise SceneFileError(f"nodes: must be at most {MAX_NODES:,}, got {count:,}")
         self._document = document
         self.nodes = document.list_of("nodes")
-        self._children = [node.indices("children", count, "nodes") for node in self.nodes]
-        self._parents = self._checked_parents()
+        self.children = [node.indices("children", count, "nodes") for node in self.nodes]
+        self.parents = self._checked_parents()
         self._world: dict[int, Float64[np.ndarray, "4 4"]] = {}
 
     def shown(self) -> list[int]:
@@ -35,7 +36,7 @@ class GltfNodes:
             visibility = self.nodes[index].extension("KHR_node_visibility")
             if visibility is None or visibility.boolean("visible", True):
                 order.append(index)
-                pending.extend(self._children[index][::-1])
+                pending.extend(self.children[index][::-1])
         return order
 
     def to_world(self, index: int) -> Float64[np.ndarray, "4 4"]:
@@ -48,7 +49,7 @@ class GltfNodes:
         at = index
         while at >= 0 and at not in self._world:
             chain.append(at)
-            at = self._parents[at]
+            at = self.parents[at]
         matrix = self._world[at] if at >= 0 else np.eye(4)
         for at in reversed(chain):
             local = local_matrix(self.nodes[at], self._document)
@@ -65,7 +66,7 @@ class GltfNodes:
     def _roots(self) -> list[int]:
         scenes = self._document.list_of("scenes")
         if not scenes:
-            roots = [index for index, parent in enumerate(self._parents) if parent < 0]
+            roots = [index for index, parent in enumerate(self.parents) if parent < 0]
             if roots:
                 self._document.warnings.add("the file has no scene: all of its nodes are shown")
             return roots
@@ -78,7 +79,7 @@ class GltfNodes:
                 )
         roots = scene.indices("nodes", len(self.nodes), "nodes")
         for root in roots:
-            if self._parents[root] >= 0:
+            if self.parents[root] >= 0:
                 raise SceneFileError(
                     f"{scene.at('nodes')}: must be root nodes, got {root}, a child of another"
                 )
@@ -88,7 +89,7 @@ class GltfNodes:
 
     def _checked_parents(self) -> list[int]:
         parents = [-1] * len(self.nodes)
-        for index, children in enumerate(self._children):
+        for index, children in enumerate(self.children):
             for child in children:
                 if parents[child] >= 0:
                     raise SceneFileError(
@@ -98,7 +99,7 @@ class GltfNodes:
         # With one parent at most, what no root leads to goes round in a circle.
         reached = [index for index, parent in enumerate(parents) if parent < 0]
         for index in reached:  # grows as it is read
-            reached.extend(self._children[index])
+            reached.extend(self.children[index])
         if len(reached) < len(parents):
             lost = min(set(range(len(parents))) - set(reached))
             raise SceneFileError(f"nodes[{lost}]: is its own ancestor")
@@ -138,20 +139,3 @@ def local_matrix(node: JsonObject, document: GltfDocument) -> Float64[np.ndarray
         rotation[None],
         node.numbers("scale", 3, default=(1.0, 1.0, 1.0))[None],
     )[0]
-
-
-def trs_matrices(
-    translation: Float64[np.ndarray, "n 3"],
-    rotation: Float64[np.ndarray, "n 4"],
-    scale: Float64[np.ndarray, "n 3"],
-) -> Float64[np.ndarray, "n 4 4"]:
-    """translation · rotation · scale; quaternions (x, y, z, w) of any length but zero."""
-    x, y, z, w = (rotation / np.linalg.norm(rotation, axis=1, keepdims=True)).T
-    matrices = np.zeros((len(scale), 4, 4))
-    matrices[:, 0, :3] = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], axis=1)
-    matrices[:, 1, :3] = np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], axis=1)
-    matrices[:, 2, :3] = np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=1)
-    matrices[:, :3, :3] *= scale[:, None, :]
-    matrices[:, :3, 3] = translation
-    matrices[:, 3, 3] = 1.0
-    return matrices

@@ -6,9 +6,10 @@ import numpy as np
 from jaxtyping import Float32, Int64
 
 from renderer.scene import Mesh
+from renderer.scene_animation import Skinning
 from renderer.scene_file.diagnostics import SceneFileError
 from renderer.scene_file.gltf_accessors import Elements, GltfAccessors
-from renderer.scene_file.gltf_deformation import Deformation, morphed, skinned
+from renderer.scene_file.gltf_deformation import Deformation, morphed, read_influences, skinned
 from renderer.scene_file.gltf_document import GltfDocument
 from renderer.scene_file.gltf_draco import decode_draco
 from renderer.scene_file.gltf_materials import BaseColor, transformed_uv
@@ -66,13 +67,14 @@ class GltfPrimitives:
             return None
         self._document.decoded.spend(triangles.nbytes, primitive.where)
         used, renumbered = used_vertices(triangles.ravel(), len(attributes["POSITION"]))
-        positions, normals = self._at_rest(primitive, attributes, used, deformation)
+        positions, normals, skinning = self._at_rest(primitive, attributes, used, deformation)
         surface = Surface(
             positions,
             renumbered.reshape(-1, 3),
             normals,
             self._uv(attributes, used, base_color),
             self._colors(attributes, used),
+            skinning,
         )
         return finished_mesh(surface, name, base_color.material, self._document.decoded, primitive.where)
 
@@ -132,8 +134,8 @@ class GltfPrimitives:
         attributes: dict[str, Elements],
         used: Int64[np.ndarray, "used"],
         deformation: Deformation,
-    ) -> tuple[Float32[np.ndarray, "used 3"], Float32[np.ndarray, "used 3"] | None]:
-        """Positions and normals of the used vertices, morphed, then skinned."""
+    ) -> tuple[Float32[np.ndarray, "used 3"], Float32[np.ndarray, "used 3"] | None, Skinning | None]:
+        """Positions and normals of the used vertices, morphed, then skinned; and by what, if that moves."""
         placed: dict[str, Float32[np.ndarray, "used 3"]] = {}
         for semantic in ("POSITION", "NORMAL"):
             if semantic in attributes:
@@ -147,9 +149,14 @@ class GltfPrimitives:
                     base, semantic, primitive, deformation.weights, self._accessors, used, vertex_count
                 )
         positions, normals = placed["POSITION"], placed.get("NORMAL")
-        if deformation.joint_to_world is not None and "JOINTS_0" in attributes:
-            return skinned(positions, normals, attributes, used, deformation.joint_to_world)
-        return positions, normals
+        if deformation.joint_to_world is None or "JOINTS_0" not in attributes:
+            return positions, normals, None
+        joints, weights = read_influences(attributes, used, len(deformation.joint_to_world))
+        at_rest = skinned(positions, normals, joints, weights, deformation.joint_to_world)
+        if not deformation.is_animated:
+            return *at_rest, None
+        bind_normals = np.zeros_like(positions) if normals is None else normals
+        return *at_rest, Skinning(positions, bind_normals, joints, weights.astype(np.float32))
 
     def _uv(
         self, attributes: dict[str, Elements], used: Int64[np.ndarray, "used"], base_color: BaseColor

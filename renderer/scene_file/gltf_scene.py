@@ -5,14 +5,15 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float64
 
-from renderer.scene import Camera, Instance, Light, Mesh, Scene
+from renderer.scene import Camera, Instance, Light, Mesh, Scene, trs_matrices
 from renderer.scene_file.diagnostics import SceneFileError, Warnings, label
 from renderer.scene_file.gltf_accessors import GltfAccessors
-from renderer.scene_file.gltf_deformation import Deformation, read_deformation
+from renderer.scene_file.gltf_animations import Placed, moving_nodes, placed_animation, read_channels
+from renderer.scene_file.gltf_deformation import Deformation, read_deformation, read_skin
 from renderer.scene_file.gltf_document import GltfDocument, open_gltf
 from renderer.scene_file.gltf_lights_cameras import read_camera, read_light
 from renderer.scene_file.gltf_materials import GltfMaterials
-from renderer.scene_file.gltf_nodes import GltfNodes, trs_matrices
+from renderer.scene_file.gltf_nodes import GltfNodes
 from renderer.scene_file.gltf_primitives import GltfPrimitives
 from renderer.scene_file.json_object import JsonObject
 from renderer.scene_file.limits import MAX_INSTANCES
@@ -28,8 +29,6 @@ def read_gltf(path: Path, warnings: Warnings) -> Scene:
     builder = _SceneBuilder(document)
     for index in builder.nodes.shown():
         builder.add_node(index)
-    if document.list_of("animations"):
-        warnings.add("animations are ignored: the scene is shown at rest")
     return Scene(
         name=label(path.stem, "scene"),
         meshes=tuple(builder.meshes),
@@ -38,6 +37,7 @@ def read_gltf(path: Path, warnings: Warnings) -> Scene:
         textures=tuple(builder.materials.textures),
         lights=tuple(builder.lights),
         cameras=tuple(builder.cameras),
+        animation=placed_animation(builder.channels, builder.placed, builder.nodes),
         warnings=warnings.lines(),
     )
 
@@ -53,6 +53,10 @@ class _SceneBuilder:
         self.instances: list[Instance] = []
         self.lights: list[Light] = []
         self.cameras: list[Camera] = []
+        self.channels = read_channels(document, self.nodes, self.accessors)
+        self.placed = Placed()
+        self._skins: dict[str, int] = {}
+        self._moving_nodes = moving_nodes(self.channels, self.nodes)
         self._meshes_at_rest: dict[tuple[str, str], int | None] = {}
 
     def add_node(self, index: int) -> None:
@@ -63,11 +67,15 @@ class _SceneBuilder:
         if mesh is not None:
             self._add_mesh(index, node, mesh)
         if camera is not None:
-            placed = read_camera(camera, self.nodes.to_world(index), self.document)
-            self.cameras += [placed] if placed is not None else []
+            filming = read_camera(camera, self.nodes.to_world(index), self.document)
+            if filming is not None:
+                self.cameras.append(filming)
+                self.placed.camera_nodes.append(index)
         if light is not None:
             shining = read_light(light, self.nodes.to_world(index), self.document)
-            self.lights += [shining] if shining is not None else []
+            if shining is not None:
+                self.lights.append(shining)
+                self.placed.light_nodes.append(index)
 
     def _light_of(self, node: JsonObject) -> JsonObject | None:
         reference = node.extension("KHR_lights_punctual")
@@ -78,18 +86,34 @@ class _SceneBuilder:
         return lights[reference.required_index("light", len(lights), "lights")]
 
     def _add_mesh(self, index: int, node: JsonObject, mesh: JsonObject) -> None:
-        deformation = read_deformation(node, mesh, self.document, self.nodes, self.accessors)
+        deformation = read_deformation(
+            node, mesh, self.document, self.nodes, self.accessors, self._moving_nodes
+        )
         # A skinned mesh stands where its joints are, whatever its own node's transform.
         is_placed_by_joints = deformation.joint_to_world is not None
-        to_world = np.eye(4)[None] if is_placed_by_joints else self._placements(index, node)
+        local = np.eye(4)[None] if is_placed_by_joints else self._placements(index, node)
+        to_world = local if is_placed_by_joints else self.nodes.to_world(index) @ local
         name = label(node.string("name", ""), node.where)
         primitives = [p for p in mesh.objects("primitives") if self.primitives.is_surface(p)]
         if len(self.instances) + len(primitives) * len(to_world) > MAX_INSTANCES:
             raise SceneFileError(f"nodes: must place at most {MAX_INSTANCES:,} primitives in all")
+        skin = self._skin_of(node) if deformation.is_animated else -1
         for primitive in primitives:
             at = self._mesh_at_rest(node, primitive, mesh, deformation)
             if at is not None:
                 self.instances += [Instance(name, at, matrix) for matrix in to_world]
+                self.placed.instance_nodes += [-1 if is_placed_by_joints else index] * len(to_world)
+                self.placed.instance_local += list(local)
+                is_bent = self.meshes[at].skinning is not None
+                self.placed.instance_skins += [skin if is_bent else -1] * len(to_world)
+
+    def _skin_of(self, node: JsonObject) -> int:
+        skin = self.document.referred(node, "skin", "skins")
+        assert skin is not None
+        if skin.where not in self._skins:
+            self._skins[skin.where] = len(self.placed.skins)
+            self.placed.skins.append(read_skin(skin, self.nodes, self.accessors))
+        return self._skins[skin.where]
 
     def _mesh_at_rest(
         self, node: JsonObject, primitive: JsonObject, mesh: JsonObject, deformation: Deformation
@@ -106,20 +130,18 @@ class _SceneBuilder:
         return self._meshes_at_rest[key]
 
     def _placements(self, index: int, node: JsonObject) -> Float64[np.ndarray, "placements 4 4"]:
-        """The node's world matrix, or one for each instance of EXT_mesh_gpu_instancing; no flattened ones."""
-        to_world = self.nodes.to_world(index)[None]
+        """From each instance of EXT_mesh_gpu_instancing to the node, else the identity; no flattened ones."""
         instancing = node.extension("EXT_mesh_gpu_instancing")
-        if instancing is not None:
-            to_world = to_world @ self._instance_matrices(instancing)
+        local = np.eye(4)[None] if instancing is None else self._instance_matrices(instancing)
         # A surface needs two directions to have area; 1e-12 is far below float32's grain.
-        stretch = np.linalg.svd(to_world[:, :3, :3], compute_uv=False)
+        stretch = np.linalg.svd((self.nodes.to_world(index) @ local)[:, :3, :3], compute_uv=False)
         is_surface = stretch[:, 1] > 1e-12 * stretch[:, 0]
         for _ in range(int((~is_surface).sum())):
             self.document.warnings.tally(
                 "1 node is scaled to a line or a point and draws nothing",
                 "{n} nodes are scaled to a line or a point and draw nothing",
             )
-        return to_world[is_surface]
+        return local[is_surface]
 
     def _instance_matrices(self, instancing: JsonObject) -> Float64[np.ndarray, "instances 4 4"]:
         attributes = instancing.required_object("attributes")

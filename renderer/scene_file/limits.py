@@ -16,6 +16,9 @@ MAX_NODES = 1 << 17
 MAX_INSTANCES = 10_000
 """Each is a draw call of its own in every pass."""
 
+MAX_CHANNELS = 10_000
+"""Of animations: each takes some 50 microseconds to read."""
+
 MAX_IMAGE_SIDE = 16384
 """The smallest limit that OpenGL 4.3 lets a driver set."""
 

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int64
 
 from renderer.scene import Mesh
+from renderer.scene_animation import Skinning
 from renderer.scene_file.diagnostics import SceneFileError
 from renderer.scene_file.limits import LARGEST_COORDINATE, DecodedBytes
 
@@ -24,6 +25,7 @@ class Surface:
     uv: Float32[np.ndarray, "vertices 2"] | None = None
     colors: Float32[np.ndarray, "vertices 3"] | None = None
     """Linear."""
+    skinning: Skinning | None = None
 
 
 def finished_mesh(
@@ -64,7 +66,10 @@ def finished_mesh(
     colors = (
         np.broadcast_to(np.ones(3, np.float32), (vertices, 3)) if surface.colors is None else surface.colors
     )
-    return Mesh(name, surface.positions, normals, uv, colors, surface.triangles.astype(np.int32), material)
+    triangles = surface.triangles.astype(np.int32)
+    if surface.skinning is not None:
+        decoded.spend(sum(array.nbytes for array in vars(surface.skinning).values()), where)
+    return Mesh(name, surface.positions, normals, uv, colors, triangles, material, surface.skinning)
 
 
 def used_vertices(
@@ -146,7 +151,8 @@ def _gathered(surface: Surface, rows: Int64[np.ndarray, "rows"]) -> Surface:
     return Surface(
         surface.positions[rows],
         surface.triangles,
-        None if surface.normals is None else surface.normals[rows],
-        None if surface.uv is None else surface.uv[rows],
-        None if surface.colors is None else surface.colors[rows],
+        normals=None if surface.normals is None else surface.normals[rows],
+        uv=None if surface.uv is None else surface.uv[rows],
+        colors=None if surface.colors is None else surface.colors[rows],
+        skinning=None if surface.skinning is None else surface.skinning.rows(rows),
     )

@@ -206,8 +206,3 @@ def test_a_skin_stands_where_its_joints_are(gltf):
     gltf.document["skins"][0]["joints"] = [1]
     with pytest.raises(InputError, match="joints must be below 1"):
         read_scene(gltf.write())
-
-
-def test_animations_are_left_out_aloud(triangle):
-    triangle.document["animations"] = [{"channels": [], "samplers": []}]
-    assert read_scene(triangle.write()).warnings == ("animations are ignored: the scene is shown at rest",)

@@ -146,11 +146,8 @@ def surrogate_irradiance(
 ) -> Float32[np.ndarray, "height width 3"]:
     """The surrogate's indirect irradiance of a whole view, zero where nothing is seen."""
     receivers, vpls = gather_inputs(view.captured)
-    falloff = FalloffParameters(
-        np.float32(parameters.intensity),
-        np.float32(parameters.falloff_footprint),
-        np.float32(parameters.falloff_transmittance),
-    )
     picture = np.zeros((*view.captured.valid.shape, 3), np.float32)
-    picture[view.captured.valid] = np.asarray(_gather(receivers, vpls, falloff, visibility))
+    picture[view.captured.valid] = np.asarray(
+        _gather(receivers, vpls, FalloffParameters.of(parameters), visibility)
+    )
     return picture

@@ -22,13 +22,13 @@ class Receivers:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class VirtualPointLights:
-    """VPLs in the same coordinates. `flux` is in W/L², so that irradiance keeps its own unit, W/m²."""
+    """VPLs, or one of them, in the same coordinates. `flux` is in W/L²: irradiance keeps its unit, W/m²."""
 
-    position: Float[Array, "vpls 3"]
-    normal: Float[Array, "vpls 3"]
-    footprint: Float[Array, "vpls"]
+    position: Float[Array, "*vpls 3"]
+    normal: Float[Array, "*vpls 3"]
+    footprint: Float[Array, "*vpls"]
     """Radius in units of L."""
-    flux: Float[Array, "vpls 3"]
+    flux: Float[Array, "*vpls 3"]
 
 
 def gather_inputs(
@@ -36,8 +36,8 @@ def gather_inputs(
 ) -> tuple[Receivers, VirtualPointLights]:
     """The receivers and VPLs of a captured frame, centred on the VPLs and scaled by L.
 
-    In these coordinates the gather's squares and products stay near 1: with |x|² + |v|² − 2 x·v in
-    float32, the digits lost are those of the distance to the centre, not to the world's origin.
+    In these coordinates no length has a unit, and float32's digits are spent on the distance to the lit
+    part of the scene, not to the world's origin.
 
     Args:
         captured: the frame; its receivers are the valid pixels in row order.

@@ -86,7 +86,7 @@ def write_views(path: Path, scene_path: str, views: tuple[View, ...]) -> None:
     write_text_whole(path, json.dumps(views_to_json(scene_path, views), indent=2) + "\n")
 
 
-def read_views(path: Path) -> tuple[View, ...]:
+def read_views(path: str | Path) -> tuple[View, ...]:
     """Read `views.json`.
 
     Raises:

@@ -10,8 +10,8 @@ from jaxtyping import Array, Bool, Float
 from renderer.artist_parameters import ArtistParameters
 from tuner.binned_gather import BinnedGather, bin_vpls, gather_binned
 from tuner.captured_view import CapturedView
-from tuner.fit import STEPS, fit
-from tuner.fit_result import FitResult, FitStatus
+from tuner.descent import STEPS, descend
+from tuner.fit_status import Descent, FitStatus
 from tuner.losses.relative_squared_error import EVEN_SHARE, Target, target_of, weighted_squared_error
 from tuner.search_space import SearchSpace
 from tuner.virtual_point_lights import gather_inputs
@@ -32,7 +32,7 @@ def fit_falloff(
     visibility: tuple[Bool[np.ndarray, "receivers vpls"], ...] | None = None,
     even_share: float = EVEN_SHARE,
     progress: Callable[[float], None] | None = None,
-) -> tuple[ArtistParameters, FitResult]:
+) -> tuple[ArtistParameters, Descent]:
     """The parameters that bring the views closest to their references, all views counting the same.
 
     Args:
@@ -51,8 +51,8 @@ def fit_falloff(
     )
     point = space.point(start)
     if not any(jnp.any(gather.irradiance > 0.0) and jnp.any(target.weight > 0.0) for gather, target in data):
-        return start, FitResult(point, np.nan, np.nan, np.array([np.nan]), FitStatus.NOTHING_LIT)
-    result = fit(_loss(space), data, point, steps=steps, progress=progress)
+        return start, Descent(point, np.nan, np.nan, np.array([np.nan]), FitStatus.NOTHING_LIT)
+    result = descend(_loss(space), data, point, steps=steps, progress=progress)
     if result.status.start_kept:
         return start, result
     return space.parameters(result.point, start), result

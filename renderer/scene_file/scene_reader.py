@@ -20,7 +20,7 @@ _READERS = {
 }
 
 
-def read_scene(path: Path) -> Scene:
+def read_scene(path: str | Path) -> Scene:
     """Read a scene from a .gltf, .glb, .obj or .ply file.
 
     Files that the scene refers to are looked for in its own folder only; nothing is fetched. What

@@ -10,7 +10,7 @@ from renderer.runtime import Runtime
 from tuner.binned_gather import bin_vpls, gather_binned
 from tuner.captured_view import CapturedView
 from tuner.fit_falloff import fit_falloff
-from tuner.fit_result import FitStatus
+from tuner.fit_status import FitStatus
 from tuner.reference.reference_view import ReferenceView
 from tuner.search_space import SearchSpace
 from tuner.virtual_point_lights import gather_inputs

@@ -1,4 +1,4 @@
-"""What a fit ends with. A fit that fails is a status with a sentence, never an exception."""
+"""What a descent ends with. One that fails is a status with a sentence, never an exception."""
 
 import enum
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 
 class FitStatus(enum.Enum):
-    """How a fit ended; the value is the sentence shown to the user."""
+    """How it ended; the value is the sentence shown to the user."""
 
     CONVERGED = "the loss has settled"
     STEP_LIMIT = "the steps ran out while the loss was still falling"
@@ -28,7 +28,7 @@ class FitStatus(enum.Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class FitResult:
+class Descent:
     """The best point met, which is never worse than the start."""
 
     point: Float[np.ndarray, "parameters"]

@@ -1,4 +1,4 @@
-"""The fit: gradient descent in the unit cube on any differentiable function from parameters to a picture.
+"""Gradient descent in the unit cube on any differentiable loss: what a fit runs.
 
 It knows nothing of light. Adam (Kingma and Ba 2015) with a cosine schedule, each step projected back into
 the cube; steps with a gradient that is not finite are passed over (`optax.apply_if_finite`).
@@ -14,13 +14,13 @@ import numpy as np
 import optax
 from jaxtyping import Array, Float
 
-from tuner.fit_result import FitResult, FitStatus
+from tuner.fit_status import Descent, FitStatus
 
 STEPS = 200
 LEARNING_RATE = 0.08
 """Of the cube's side in the first steps: any point can be reached from any other within about twenty."""
 BLOCK = 20
-"""Steps compiled into one scan; between blocks the fit reports progress and can be interrupted."""
+"""Steps compiled into one scan; between blocks the descent reports progress and can be interrupted."""
 SETTLED = 1e-5
 """Relative fall of the best loss over a block below which it counts as settled."""
 _MAX_BAD_GRADIENTS = 1000
@@ -28,14 +28,14 @@ _MAX_BAD_GRADIENTS = 1000
 Data = TypeVar("Data")
 
 
-def fit(
+def descend(
     loss: Callable[[Float[Array, "parameters"], Data], Float[Array, ""]],
     data: Data,
     start: Float[np.ndarray, "parameters"],
     *,
     steps: int = STEPS,
     progress: Callable[[float], None] | None = None,
-) -> FitResult:
+) -> Descent:
     """Minimise `loss(point, data)` over the unit cube.
 
     Args:
@@ -50,7 +50,7 @@ def fit(
     start_loss = float(jax.jit(loss)(point, data))
     best = (point, jnp.float32(start_loss))
     if not np.isfinite(start_loss):
-        return FitResult(
+        return Descent(
             np.asarray(point), start_loss, start_loss, np.array([start_loss]), FitStatus.NOT_FINITE
         )
     state, losses, status = optimizer.init(point), [np.array([start_loss])], FitStatus.STEP_LIMIT
@@ -67,7 +67,7 @@ def fit(
             break
     if not float(best[1]) < start_loss:
         status = FitStatus.NO_IMPROVEMENT
-    return FitResult(np.asarray(best[0]), float(best[1]), start_loss, np.concatenate(losses), status)
+    return Descent(np.asarray(best[0]), float(best[1]), start_loss, np.concatenate(losses), status)
 
 
 def _optimizer(steps: int) -> optax.GradientTransformation:

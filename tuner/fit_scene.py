@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from renderer.artist_parameters import ArtistParameters
+from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
 from renderer.atomic_file import write_text_whole
 from renderer.errors import InputError
 from renderer.strict_json import strict_json
@@ -123,16 +123,8 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
 
 def default_like(start: ArtistParameters) -> ArtistParameters:
     """The defaults at the start's own cost: what is not fitted is the same in all that is compared."""
-    default = ArtistParameters()
-    return ArtistParameters(
-        intensity=default.intensity,
-        falloff_footprint=default.falloff_footprint,
-        falloff_transmittance=default.falloff_transmittance,
-        vpl_count=start.vpl_count,
-        density_exponent=start.density_exponent,
-        screen_space_radius=start.screen_space_radius,
-        screen_space_strength=start.screen_space_strength,
-    )
+    kept = {spec.name: getattr(start, spec.name) for spec in ARTIST_PARAMETERS if not spec.fitted}
+    return ArtistParameters(**{**ArtistParameters().as_dict(), **kept})
 
 
 def _provenance(

@@ -23,7 +23,10 @@ class CapturedFrame:
     """Shading normal, towards the camera."""
     albedo: Float32[np.ndarray, "height width 3"]
     direct_irradiance: Float32[np.ndarray, "height width 3"]
+    vpl_irradiance: Float32[np.ndarray, "height width 3"]
+    """From the VPLs alone: what the tuner's surrogate is a twin of."""
     indirect_irradiance: Float32[np.ndarray, "height width 3"]
+    """With the screen-space near field, where its strength is not 0."""
     vpl_position_world: Float32[np.ndarray, "vpls 3"]
     vpl_normal_world: Float32[np.ndarray, "vpls 3"]
     vpl_footprint: Float32[np.ndarray, "vpls"]
@@ -50,6 +53,7 @@ def capture_frame(frame: Frame, view: View) -> CapturedFrame:
         normal_world=octahedral_decode(read_picture(frame.gbuffer.normal)),
         albedo=read_picture(frame.gbuffer.albedo)[..., :3].astype(np.float32),
         direct_irradiance=read_picture(frame.direct_irradiance)[..., :3],
+        vpl_irradiance=read_picture(frame.vpl_irradiance)[..., :3],
         indirect_irradiance=read_picture(frame.indirect_irradiance)[..., :3],
         vpl_position_world=vpls[:, 0:3],
         vpl_normal_world=vpls[:, 4:7],

@@ -1,4 +1,4 @@
-"""One frame, as the diagram has it: G-buffer ► RSM ► VPLs ► gather ► filter ► resolve ► tone curve."""
+"""One frame, as the diagram has it: G-buffer ► RSM ► VPLs ► gather ► filter ► screen-space ► resolve ► tone curve."""
 
 import moderngl
 import numpy as np
@@ -12,6 +12,8 @@ from renderer.passes.geometry import GeometryPass
 from renderer.passes.interleaved_filter import InterleavedFilterPass
 from renderer.passes.material_resolve import MaterialResolvePass
 from renderer.passes.reflective_shadow_map import ReflectiveShadowMapPass
+from renderer.passes.screen_space_indirect import BLOCK as SCREEN_SPACE_BLOCK
+from renderer.passes.screen_space_indirect import ScreenSpaceIndirectPass
 from renderer.passes.tone_mapping import ToneMappingPass
 from renderer.passes.virtual_point_lights import VirtualPointLightsPass
 from renderer.passes.vpl_gather import VplGatherPass
@@ -50,7 +52,9 @@ class Frame:
         self.rsm = create_reflective_shadow_map(context, rsm_resolution, face_count)
         self.direct_irradiance = create_irradiance_target(context, size)
         self.vpl_irradiance = create_irradiance_target(context, size)
+        self.near_field_irradiance = create_irradiance_target(context, size)
         self.indirect_irradiance = self.vpl_irradiance
+        self._interleaved_irradiance = create_irradiance_target(context, size)
         self.radiance = create_irradiance_target(context, size)
         self.display = create_display_target(context, size)
 
@@ -63,9 +67,10 @@ class Frame:
         self._vpl_gather = VplGatherPass(context, options.interleave)
         self._interleaved_filter: InterleavedFilterPass | None = None
         if options.interleave > 1:
-            self.interleaved_irradiance = create_irradiance_target(context, size)
             self._pixel_list = create_pixel_list(context, size)
             self._interleaved_filter = InterleavedFilterPass(context, options.interleave, refine=True)
+        self._screen_space_indirect = ScreenSpaceIndirectPass(context, size, rsm_resolution)
+        self._screen_space_filter = InterleavedFilterPass(context, SCREEN_SPACE_BLOCK, add_base=True)
         self._material_resolve = MaterialResolvePass(context)
         self._tone_mapping = ToneMappingPass(context)
 
@@ -86,6 +91,7 @@ class Frame:
         )
         self._direct_light.draw(camera, self.gbuffer, self.rsm, len(view.lights), self.direct_irradiance)
         self._gather(camera, parameters)
+        self.indirect_irradiance = self._with_near_field(camera, len(view.lights), parameters)
 
     def resolve(self, share: tuple[float, float], exposure: float | None) -> None:
         """From the irradiance buffers to radiance and the display picture.
@@ -110,11 +116,34 @@ class Frame:
         if self._interleaved_filter is None:
             self._vpl_gather.draw(camera, self.gbuffer, count, parameters, picture)
             return
-        self._vpl_gather.draw(camera, self.gbuffer, count, parameters, self.interleaved_irradiance)
+        self._vpl_gather.draw(camera, self.gbuffer, count, parameters, self._interleaved_irradiance)
         self._interleaved_filter.draw(
-            camera, self.gbuffer, self.interleaved_irradiance, picture, pixel_list=self._pixel_list
+            camera, self.gbuffer, self._interleaved_irradiance, picture, pixel_list=self._pixel_list
         )
         self._vpl_gather.refine(camera, self.gbuffer, count, parameters, self._pixel_list, picture)
+
+    def _with_near_field(
+        self, camera: CameraUniforms, light_count: int, parameters: ArtistParameters
+    ) -> moderngl.Texture:
+        if parameters.screen_space_strength == 0.0:
+            return self.vpl_irradiance
+        self._screen_space_indirect.draw(
+            camera,
+            self.gbuffer,
+            self.direct_irradiance,
+            light_count,
+            self.virtual_point_lights.count,
+            parameters,
+            self._interleaved_irradiance,
+        )
+        self._screen_space_filter.draw(
+            camera,
+            self.gbuffer,
+            self._interleaved_irradiance,
+            self.near_field_irradiance,
+            base=self.vpl_irradiance,
+        )
+        return self.near_field_irradiance
 
     def _bind_lights(self, records: LightRecords) -> None:
         size = max(1, len(records.lights)) * LIGHT_DTYPE.itemsize

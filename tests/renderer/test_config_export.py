@@ -38,7 +38,8 @@ def test_glsl_is_ascii_and_says_names_and_units():
 
 
 def test_glsl_names():
-    assert [glsl_name(spec) for spec in ARTIST_PARAMETERS[-2:]] == ["VPL_COUNT", "VPL_DENSITY_EXPONENT"]
+    names = [glsl_name(spec) for spec in ARTIST_PARAMETERS]
+    assert names[3:6] == ["VPL_COUNT", "VPL_DENSITY_EXPONENT", "VPL_SCREEN_SPACE_RADIUS"]
 
 
 def test_an_out_of_range_config_is_not_exported():

@@ -56,6 +56,23 @@ def test_every_layer_is_a_picture_and_an_exr(views_path, tmp_path, layer):
     assert pixels.max() > 0.0
 
 
+def test_interleaved_pictures_are_near_the_full_one(views_path, tmp_path):
+    """Their energy within 5 %: at 32×24, one pixel in five stands at an edge."""
+    means = []
+    for n in ("1", "4"):
+        path = tmp_path / f"{n}.exr"
+        assert render(views_path, path, "--layer", "irradiance", "--interleave", n) == 0
+        means.append(float(read_exr(path).mean()))
+    assert means[0] != means[1]
+    assert means[1] == pytest.approx(means[0], rel=0.05)
+
+
+def test_a_block_of_another_size_is_refused(views_path, tmp_path, capfd):
+    assert render(views_path, tmp_path / "a.png", "--interleave", "3") == 2
+    assert "--interleave: must be 1, 2, 4 or 8, got 3" in capfd.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
 def test_exr_of_final_is_the_radiance_before_the_tone_curve(views_path, tmp_path):
     pixels = {}
     for layer in ("final", "direct", "indirect"):

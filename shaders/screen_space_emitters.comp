@@ -1,0 +1,66 @@
+// What every pixel gives to its neighbourhood: its radiosity from direct light, and the squared footprint that
+// a VPL has which is drawn on its surface.
+//
+// A draw takes RSM texel i, of area A_i and reflected flux Φ_i, with chance p_i = Φ_i^γ / W, W = Σ Φ_i^γ. Its VPL
+// stands for the area A = A_i / (N p_i) = A_i W / (N Φ_i^γ). Where the radiosity is B, Φ_i = B A_i, so
+//     A = A_i^(1-γ) W / (N B^γ),    l² = A / π.
+// For γ = 1 the texel's own area drops out: A = Φ_total / (N B), each VPL the same flux.
+// Where several lights shine on one point, each has VPLs of its own, wider than l: less is then given than
+// was lost, never more.
+#include "common/gbuffer.glsl"
+#include "common/rsm.glsl"
+#include "common/scene_length.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+uniform sampler2D gbuffer_albedo;
+uniform sampler2D direct_irradiance;
+uniform int vpl_count;
+uniform int light_count;
+uniform float density_exponent;
+
+layout(rgba32f, binding = 0) writeonly uniform image2D out_emitters;  // radiosity [W/m²], l² [world units²]
+
+// Area on the surface of the RSM texel that sees it: of the light that shines on it most, shadows aside.
+float rsm_texel_area(Receiver receiver) {
+    float most = 0.0;
+    float area = 0.0;
+    for (int i = 0; i < light_count; ++i) {
+        Light light = lights[i];
+        vec3 to_light = towards_light(light, receiver.position_world);
+        float cosine = dot(receiver.normal_world, to_light);
+        float arriving = mean_flux(irradiance_facing(light, receiver.position_world)) * cosine;
+        if (!(arriving > most)) {
+            continue;
+        }
+        for (int f = light.faces.x; f < light.faces.x + light.faces.y; ++f) {
+            RsmFace face = rsm_faces[f];
+            vec3 position_face = world_to_face(face, receiver.position_world);
+            float depth = face.orthographic != 0 ? 1.0 : -position_face.z;
+            if (depth > 0.0 && all(lessThanEqual(abs(position_face.xy), face.extent * depth))) {
+                vec2 side = face.extent * (2.0 * depth / RSM_RESOLUTION);
+                float tilt = face.orthographic != 0 ? 1.0 : depth / length(position_face);
+                most = arriving;
+                area = side.x * side.y * tilt / max(cosine, RSM_MIN_COSINE);
+            }
+        }
+    }
+    return area;
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(pixel, imageSize(out_emitters)))) {
+        return;
+    }
+    vec3 radiosity = texelFetch(gbuffer_albedo, pixel, 0).rgb * texelFetch(direct_irradiance, pixel, 0).rgb;
+    float level = mean_flux(radiosity);
+    float area = 0.0;
+    if (level > 0.0) {
+        area = total_weight / (float(vpl_count) * pow(level, density_exponent));
+        if (density_exponent < 1.0) {
+            area *= pow(rsm_texel_area(gbuffer_receiver(pixel)), 1.0 - density_exponent);
+        }
+    }
+    imageStore(out_emitters, pixel, vec4(radiosity, area / PI));
+}

@@ -1,0 +1,93 @@
+// Screen-space indirect: from directly lit pixels nearby, the light that softened VPLs withhold.
+//
+// A VPL's 1/d² is softened to 1/(d² + (αl)²). Summed over draws, VPLs give the integral of the softened kernel over
+// lit surfaces; what is missing is the same integral with
+//     1/d² - 1/(d² + (αl)²) = 1/d² · (1 - d²/(d² + (αl)²)),
+// intensity k and transmittance T(d) alike. It falls as 1/d⁴, so that the visible surroundings hold nearly all
+// of it; Nichols and Wyman (2010) and Novák et al. (2011) restore bounded VPL light the same way.
+// A pixel stands for the area a·z²/(n·v) of its surface, a its area at unit depth, v the ray of unit depth.
+//
+// Samples lie evenly in angle and in the logarithm of the radius, for the integrand falls as 1/r² in a corner.
+// The pixels of a 4×4 block take different runs of one R2 sequence; the interleaved filter puts them together.
+#include "common/gbuffer.glsl"
+#include "common/scene_length.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+uniform sampler2D emitters;
+uniform float intensity;
+uniform float falloff_footprint;
+uniform float falloff_transmittance;
+uniform float screen_space_radius;
+uniform float screen_space_strength;
+
+layout(std430, binding = VPL_FOOTPRINT_BINDING) readonly buffer VplFootprint {
+    float mean_vpl_footprint;
+};
+
+layout(rgba32f, binding = 0) writeonly uniform image2D out_irradiance;
+
+const float PI = 3.14159265358979;
+const vec2 R2_STEP = vec2(R2_STEP_X, R2_STEP_Y);
+
+// Irradiance from the whole of pixel `at`, per pixel area.
+vec3 near_field(Receiver receiver, ivec2 at) {
+    vec4 emitter = texelFetch(emitters, at, 0);
+    Receiver surface = gbuffer_receiver(at);
+    if (!surface.valid || !(emitter.a > 0.0)) {
+        return vec3(0.0);
+    }
+    vec3 to_emitter = surface.position_world - receiver.position_world;
+    float distance_squared = max(dot(to_emitter, to_emitter), 1e-30);
+    float cosine_receiver = max(dot(receiver.normal_world, to_emitter), 0.0);
+    float cosine_emitter = max(-dot(surface.normal_world, to_emitter), 0.0);
+
+    vec2 size = vec2(textureSize(emitters, 0));
+    vec3 from_eye = surface.position_world - camera_to_world[3].xyz;
+    float view_depth = -dot(camera_to_world[2].xyz, from_eye);
+    vec3 ray = from_eye / view_depth;
+    float cosine_eye = max(-dot(surface.normal_world, ray), MIN_EYE_COSINE * length(ray));
+    vec2 side = 2.0 * view_depth * tan_half_fov / size;
+    float area = side.x * side.y / cosine_eye;
+
+    float softening = falloff_footprint * falloff_footprint * emitter.a;
+    float lost = softening / (distance_squared + softening);
+    // The pixel itself is a disc, not a point: with its area, no neighbour gives more than its form factor.
+    float form = cosine_receiver * cosine_emitter / distance_squared / (distance_squared + area / PI);
+    float transmittance = exp(-falloff_transmittance * sqrt(distance_squared) / scene_length);
+    return emitter.rgb * (area / PI * form * lost * transmittance);
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 size = imageSize(out_irradiance);
+    if (any(greaterThanEqual(pixel, size))) {
+        return;
+    }
+    Receiver receiver = gbuffer_receiver(pixel);
+    if (!receiver.valid) {
+        imageStore(out_irradiance, pixel, vec4(0.0));
+        return;
+    }
+    float view_depth = near_plane / texelFetch(gbuffer_depth, pixel, 0).r;
+    float pixel_footprint = 2.0 * tan_half_fov.y * view_depth / float(size.y);
+    // No farther than the picture is high: what is beyond would not be seen either.
+    float radius = min(screen_space_radius * mean_vpl_footprint / pixel_footprint, float(size.y));
+    vec3 irradiance = vec3(0.0);
+    if (radius > NEAREST_PIXEL) {
+        float stretch = log(radius / NEAREST_PIXEL);
+        ivec2 place = pixel % BLOCK;
+        int first = (place.y * BLOCK + place.x) * SAMPLES;
+        for (int i = 0; i < SAMPLES; ++i) {
+            vec2 point = fract(0.5 + float(first + i) * R2_STEP);
+            float reach = NEAREST_PIXEL * exp(stretch * point.y);
+            float angle = 2.0 * PI * point.x;
+            ivec2 at = ivec2(floor(vec2(pixel) + 0.5 + reach * vec2(cos(angle), sin(angle))));
+            if (all(greaterThanEqual(at, ivec2(0))) && all(lessThan(at, size))) {
+                irradiance += near_field(receiver, at) * (reach * reach);
+            }
+        }
+        irradiance *= intensity * screen_space_strength * 2.0 * PI * stretch / float(SAMPLES);
+    }
+    imageStore(out_irradiance, pixel, vec4(irradiance, 1.0));
+}

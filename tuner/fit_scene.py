@@ -5,16 +5,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from renderer.artist_parameters import ArtistParameters
+from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
 from renderer.atomic_file import write_text_whole
 from renderer.errors import InputError
 from renderer.strict_json import strict_json
-from renderer.tuned_config import TunedConfig, write_config
+from renderer.tuned_config import TunedConfig, read_config, write_config
 from renderer.views import write_views
 from tuner.comparison_picture import write_comparison
 from tuner.evaluate import SPLITS, EvaluatedView, Evaluation, evaluate
 from tuner.fit_falloff import fit_falloff
-from tuner.fit_result import FitResult
+from tuner.fit_status import Descent
 from tuner.prepare_scene import PreparedScene, Progress, SceneOptions, Stopwatch, prepare_scene
 from tuner.reference.content_key import scene_digest
 
@@ -30,18 +30,43 @@ class FitOptions(SceneOptions):
 
 
 @dataclass(frozen=True, eq=False)
-class SceneFit:
+class FitResult:
     """What `fit_scene` made."""
 
     config: TunedConfig
-    result: FitResult
+    descent: Descent
     evaluation: Evaluation
     notes: tuple[str, ...]
     document: dict[str, Any]
     """What metrics.json holds, and `vpltune fit --json` prints."""
 
 
-def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Progress) -> SceneFit:
+def fit(
+    scene: str | Path,
+    output: str | Path,
+    *,
+    config: str | Path = "default",
+    progress: Progress | None = None,
+    **options: Any,
+) -> FitResult:
+    """Fit a scene from Python as `vpltune fit` does; see `fit_scene` for what is written and raised.
+
+    Args:
+        scene: a glTF, OBJ or PLY file.
+        output: the folder for tuned.json, views.json, metrics.json and comparison.png.
+        config: where the fit starts: a config file, or "default".
+        progress: called with a stage's name and the share of it that is done, in [0, 1].
+        options: fields of `tuner.prepare_scene.SceneOptions`: views, seed, bounces, camera, light, size …
+
+    Example:
+        >>> result = tuner.fit("configs/scenes/cornell-box.glb", "out/cornell", views=4)
+        >>> renderer.Runtime(renderer.read_scene(path), result.config).render(view)
+    """
+    chosen = FitOptions(start=read_config(config), **options)
+    return fit_scene(Path(scene), Path(output), chosen, progress or (lambda stage, share: None))
+
+
+def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Progress) -> FitResult:
     """Fit a scene and write tuned.json, views.json, metrics.json and comparison.png into `output`.
 
     Every file is written whole, and only once the fit and its measurement are done. References are kept
@@ -57,7 +82,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
     prepared = prepare_scene(scene_path, options, options.start, watch, progress)
     fitted = tuple(view for view in prepared.views if view.view.split == "fitted")
     with watch.stage("fit"):
-        tuned, result = fit_falloff(
+        tuned, descent = fit_falloff(
             fitted,
             options.start.parameters,
             seed=options.seed,
@@ -73,7 +98,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
             seed=options.seed,
             progress=lambda share: progress("evaluate", share),
         )
-    config = TunedConfig(tuned, _provenance(prepared, options, result))
+    config = TunedConfig(tuned, _provenance(prepared, options, descent))
     write_views(output / "views.json", str(scene_path), tuple(view.view for view in prepared.views))
     write_comparison(
         output / "comparison.png", prepared.runtime, _first_of_each_split(evaluation), PANEL_HEIGHT
@@ -85,33 +110,25 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
         "views": str(output / "views.json"),
         "metrics": evaluation.summary(),
         "seconds": watch.report(),
-        "status": "failed" if result.status.failed else "ok",
-        "sentence": result.status.value,
-        "loss": {"start": result.start_loss, "end": result.loss, "steps": len(result.losses) - 1},
+        "status": "failed" if descent.status.failed else "ok",
+        "sentence": descent.status.value,
+        "loss": {"start": descent.start_loss, "end": descent.loss, "steps": len(descent.losses) - 1},
         "ceiling_parameters": evaluation.ceiling_parameters.as_dict(),
         "per_view": evaluation.per_view(),
         "notes": list(prepared.notes),
     }
     write_text_whole(output / "metrics.json", strict_json(document) + "\n")
-    return SceneFit(config, result, evaluation, prepared.notes, document)
+    return FitResult(config, descent, evaluation, prepared.notes, document)
 
 
 def default_like(start: ArtistParameters) -> ArtistParameters:
     """The defaults at the start's own cost: what is not fitted is the same in all that is compared."""
-    default = ArtistParameters()
-    return ArtistParameters(
-        intensity=default.intensity,
-        falloff_footprint=default.falloff_footprint,
-        falloff_transmittance=default.falloff_transmittance,
-        vpl_count=start.vpl_count,
-        density_exponent=start.density_exponent,
-        screen_space_radius=start.screen_space_radius,
-        screen_space_strength=start.screen_space_strength,
-    )
+    kept = {spec.name: getattr(start, spec.name) for spec in ARTIST_PARAMETERS if not spec.fitted}
+    return ArtistParameters(**{**ArtistParameters().as_dict(), **kept})
 
 
 def _provenance(
-    prepared: PreparedScene, options: FitOptions, result: FitResult
+    prepared: PreparedScene, options: FitOptions, descent: Descent
 ) -> dict[str, str | int | float]:
     return {
         "scene": prepared.scene.name,
@@ -122,7 +139,7 @@ def _provenance(
         "views": options.views,
         "seed": options.seed,
         "bounces": options.bounces,
-        "fit": result.status.value,
+        "fit": descent.status.value,
     }
 
 

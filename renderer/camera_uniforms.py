@@ -23,7 +23,9 @@ class CameraUniforms:
     near_plane: float
     eye_world: tuple[float, float, float]
 
-    def bind_gbuffer(self, program: moderngl.ComputeShader, gbuffer: GBuffer, first_unit: int) -> None:
+    def bind_gbuffer(
+        self, program: moderngl.Program | moderngl.ComputeShader, gbuffer: GBuffer, first_unit: int
+    ) -> None:
         """Bind the G-buffer for shaders that include `common/gbuffer.glsl`."""
         gbuffer.depth.use(first_unit)
         gbuffer.normal.use(first_unit + 1)

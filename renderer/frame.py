@@ -1,4 +1,7 @@
-"""One frame, as the diagram has it: G-buffer ► RSM ► VPLs ► gather ► filter ► screen-space ► resolve ► tone curve."""
+"""One frame, as the diagram has it.
+
+G-buffer ► lights ► RSM ► VPLs ► gather ► filter ► screen-space ► resolve ► tone curve.
+"""
 
 import moderngl
 import numpy as np
@@ -6,7 +9,9 @@ import numpy as np
 from renderer import buffer_bindings
 from renderer.artist_parameters import ArtistParameters
 from renderer.camera_uniforms import CameraUniforms, camera_uniforms
+from renderer.dynamic_lights import DynamicLights
 from renderer.light_faces import FACE_DTYPE, LIGHT_DTYPE, LightRecords, light_records
+from renderer.light_pre_pass import LightPrePass
 from renderer.passes.direct_light import DirectLightPass
 from renderer.passes.geometry import GeometryPass
 from renderer.passes.interleaved_filter import InterleavedFilterPass
@@ -61,6 +66,7 @@ class Frame:
         self._lights: moderngl.Buffer | None = None
         self._faces = context.buffer(reserve=max(1, face_count) * FACE_DTYPE.itemsize)
         self._geometry = GeometryPass(context, scene)
+        self.light_pre_pass = LightPrePass(context, self.gbuffer, options.light_path)
         self._reflective_shadow_map = ReflectiveShadowMapPass(context, scene)
         self.virtual_point_lights = VirtualPointLightsPass(context, self.rsm, vpl_count)
         self._direct_light = DirectLightPass(context, rsm_resolution)
@@ -80,16 +86,20 @@ class Frame:
         records: LightRecords,
         parameters: ArtistParameters,
         table_rotation: tuple[float, float] = (0.0, 0.0),
+        lights: DynamicLights | None = None,
     ) -> None:
         """Draw `view` up to the irradiance buffers."""
         camera = self.camera(view)
         self._bind_lights(records)
         self._geometry.draw(camera, self.gbuffer)
+        accumulated = self.light_pre_pass.draw(camera, lights)
         self._reflective_shadow_map.draw(self.rsm)
         self.virtual_point_lights.draw(
             self.rsm, records.moment_origin, parameters.density_exponent, table_rotation
         )
-        self._direct_light.draw(camera, self.gbuffer, self.rsm, len(view.lights), self.direct_irradiance)
+        self._direct_light.draw(
+            camera, self.gbuffer, self.rsm, len(view.lights), accumulated, self.direct_irradiance
+        )
         self._gather(camera, parameters)
         self.indirect_irradiance = self._with_near_field(camera, len(view.lights), parameters)
 

@@ -97,6 +97,20 @@ def create_irradiance_target(context: moderngl.Context, size: tuple[int, int]) -
 
 
 @dataclass(frozen=True)
+class LightAccumulation:
+    """The sum of the dynamic lights' irradiance at every pixel."""
+
+    texture: moderngl.Texture
+    unit: float
+    """Irradiance [W/m²] that is stored as 1."""
+
+
+def create_light_accumulation_target(context: moderngl.Context, size: tuple[int, int]) -> moderngl.Texture:
+    """A half-float RGBA picture of irradiance, in the unit that `DynamicLights.accumulation_unit` states."""
+    return _nearest(context.texture(size, 4, dtype="f2"))
+
+
+@dataclass(frozen=True)
 class PixelList:
     """Pixels that a pass leaves to another, counted on the GPU (shaders/common/pixel_list.glsl)."""
 

@@ -1,13 +1,16 @@
 """The runtime: a scene and a tuned config in, pictures out."""
 
+import functools
+from collections.abc import Callable
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import moderngl
 import numpy as np
 
 from renderer.artist_parameters import ArtistParameters
 from renderer.capture import CapturedFrame, capture_frame, read_picture
+from renderer.dynamic_lights import DynamicLights
 from renderer.frame import Frame, frame_light_records
 from renderer.gpu_context import check_errors, create_context
 from renderer.runtime_options import RuntimeOptions
@@ -28,6 +31,20 @@ FEW_FACES = 2
 DEFAULT_OPTIONS = RuntimeOptions()
 
 _SHARES = {"direct": (1.0, 0.0), "indirect": (0.0, 1.0)}
+
+
+def _on_own_context(method: Callable[..., Any]) -> Callable[..., Any]:
+    """Make the runtime's context current before a call: another runtime may have taken its place.
+
+    It stays current. moderngl's `with context` would leave none current behind it, not the one before.
+    """
+
+    @functools.wraps(method)
+    def on_own_context(self: "Runtime", *arguments: object, **keywords: object) -> Any:
+        self._context.__enter__()
+        return method(self, *arguments, **keywords)
+
+    return on_own_context
 
 
 class Runtime:
@@ -56,11 +73,19 @@ class Runtime:
         self.parameters: ArtistParameters = loaded.parameters
         self._context = create_context() if context is None else context
         self._rsm_resolution = rsm_resolution
+        self._context.__enter__()
         self.scene_buffers = SceneBuffers(self._context, scene)
         self._frames: dict[tuple[tuple[int, int], int, int], Frame] = {}
 
-    def render(self, view: View, layer: Layer = "final", exposure: float | None = None) -> np.ndarray:
-        """Draw one layer of a view, row 0 at the top.
+    @_on_own_context
+    def render(
+        self,
+        view: View,
+        layer: Layer = "final",
+        exposure: float | None = None,
+        lights: DynamicLights | None = None,
+    ) -> np.ndarray:
+        """Draw one layer of a view, row 0 at the top; `lights` shine beside the view's own.
 
         `final` is [height, width, 3] uint8, sRGB, after exposure (None: measured) and tone curve. The
         others are linear float32: `direct` and `indirect` radiance and their sum before the tone curve
@@ -71,25 +96,39 @@ class Runtime:
             MachineError: the GPU ran out of memory or reported an error.
         """
         if layer in ("irradiance", "albedo", "normal", "depth"):
-            captured = self.capture(view)
+            captured = self.capture(view, lights=lights)
             return {
                 "irradiance": captured.indirect_irradiance,
                 "albedo": captured.albedo,
                 "normal": captured.normal_world * captured.valid[..., None],
                 "depth": captured.depth,
             }[layer]
-        frame = self._draw(view)
+        frame = self._draw(view, lights=lights)
         frame.resolve(_SHARES.get(layer, (1.0, 1.0)), exposure)
         picture = read_picture(frame.display if layer == "final" else frame.radiance)[..., :3]
         check_errors(self._context, f"layer {layer} of view {view.name}")
         return np.ascontiguousarray(picture)
 
-    def render_radiance(self, view: View) -> np.ndarray:
+    @_on_own_context
+    def draw(
+        self, view: View, exposure: float | None = None, lights: DynamicLights | None = None
+    ) -> moderngl.Texture:
+        """Draw a view up to the 8-bit display picture, which stays on the GPU: nothing is read back.
+
+        Row 0 is at the bottom; the texture is the frame's own and holds until the next draw.
+        """
+        frame = self._draw(view, lights=lights)
+        frame.resolve((1.0, 1.0), exposure)
+        return frame.display
+
+    @_on_own_context
+    def render_radiance(self, view: View, lights: DynamicLights | None = None) -> np.ndarray:
         """Direct plus indirect radiance, [height, width, 3] float32, linear, without a tone curve."""
-        frame = self._draw(view)
+        frame = self._draw(view, lights=lights)
         frame.resolve((1.0, 1.0), 1.0)
         return np.ascontiguousarray(read_picture(frame.radiance)[..., :3])
 
+    @_on_own_context
     def display(self, radiance: np.ndarray, exposure: float | None = None) -> np.ndarray:
         """Any radiance picture, [height, width, 3 or 4], through this runtime's exposure and tone curve.
 
@@ -102,21 +141,32 @@ class Runtime:
         frame.tone_map(exposure)
         return np.ascontiguousarray(read_picture(frame.display)[..., :3])
 
-    def capture(self, view: View, table_rotation: tuple[float, float] = (0.0, 0.0)) -> CapturedFrame:
+    @_on_own_context
+    def capture(
+        self,
+        view: View,
+        table_rotation: tuple[float, float] = (0.0, 0.0),
+        lights: DynamicLights | None = None,
+    ) -> CapturedFrame:
         """Draw a view and read back the buffers that the gather reads and makes.
 
         `table_rotation` in [0, 1)² shifts the VPL point table on its torus: another, equally good
         placement of the VPLs.
         """
-        frame = self._draw(view, table_rotation)
+        frame = self._draw(view, table_rotation, lights)
         captured = capture_frame(frame, view)
         check_errors(self._context, f"the buffers of view {view.name}")
         return captured
 
-    def _draw(self, view: View, table_rotation: tuple[float, float] = (0.0, 0.0)) -> Frame:
+    def _draw(
+        self,
+        view: View,
+        table_rotation: tuple[float, float] = (0.0, 0.0),
+        lights: DynamicLights | None = None,
+    ) -> Frame:
         records = frame_light_records(self.scene_buffers, view)
         frame = self._frame(view.size, len(records.faces))
-        frame.draw(view, records, self.parameters, table_rotation)
+        frame.draw(view, records, self.parameters, table_rotation, lights)
         return frame
 
     def _frame(self, size: tuple[int, int], face_count: int) -> Frame:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 Interleave = Literal[1, 2, 4, 8]
+LightPath = Literal["auto", "volumes", "tiles"]
 
 
 @dataclass(frozen=True)
@@ -18,6 +19,12 @@ class RuntimeOptions:
     """Pixels along the side of a block that shares the VPLs out among its pixels. 1 gathers every VPL at
     every pixel, which is what the tuner's surrogate is a twin of; 4 is some ten times faster."""
 
+    light_path: LightPath = "auto"
+    """How dynamic lights are drawn: as blended volumes, in tiles, or in whichever of the two is measured to
+    be faster on this machine, when a frame first has that many lights."""
+
     def __post_init__(self) -> None:
         if self.interleave not in get_args(Interleave):
             raise ValueError(f"interleave: must be one of {get_args(Interleave)}, got {self.interleave!r}")
+        if self.light_path not in get_args(LightPath):
+            raise ValueError(f"light_path: must be one of {get_args(LightPath)}, got {self.light_path!r}")

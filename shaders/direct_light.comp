@@ -1,4 +1,5 @@
-// Direct irradiance of all punctual lights at every pixel, shadowed by the lights' RSMs.
+// Direct irradiance at every pixel: what the light pre-pass has summed, and all punctual lights, shadowed by
+// their RSMs.
 #include "common/gbuffer.glsl"
 #include "common/rsm.glsl"
 
@@ -7,6 +8,8 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(rgba32f, binding = 0) writeonly uniform image2D out_irradiance;
 
 uniform int light_count;
+uniform sampler2D light_accumulation;
+uniform float accumulation_unit;  // irradiance [W/m²] of a stored 1; 0 where there is nothing to add
 
 // Shadow bias in RSM texels, so that it holds at every scale and resolution: the receiver is moved off its
 // surface by NORMAL_BIAS texels, and a blocker must stand DEPTH_BIAS texels in front of it.
@@ -55,6 +58,10 @@ void main() {
     }
     Receiver receiver = gbuffer_receiver(pixel);
     vec3 irradiance = vec3(0.0);
+    if (receiver.valid && accumulation_unit > 0.0) {
+        // The largest half float: a sum beyond it was stored as infinity.
+        irradiance = accumulation_unit * min(texelFetch(light_accumulation, pixel, 0).rgb, 65504.0);
+    }
     if (receiver.valid) {
         for (int i = 0; i < light_count; ++i) {
             vec3 to_light = towards_light(lights[i], receiver.position_world);

@@ -1,15 +1,15 @@
-"""Direct light of the punctual lights, with shadows from their RSMs."""
+"""Direct light: the light pre-pass's sum, and the punctual lights with shadows from their RSMs."""
 
 import moderngl
 
 from renderer import buffer_bindings
 from renderer.camera_uniforms import CameraUniforms
-from renderer.render_targets import GBuffer, ReflectiveShadowMap
+from renderer.render_targets import GBuffer, LightAccumulation, ReflectiveShadowMap
 from renderer.shader_library import load_compute, set_uniforms
 
 
 class DirectLightPass:
-    """G-buffer, RSM → direct irradiance."""
+    """G-buffer, RSM, light accumulation → direct irradiance."""
 
     def __init__(self, context: moderngl.Context, rsm_resolution: int):
         self._context = context
@@ -22,11 +22,17 @@ class DirectLightPass:
         gbuffer: GBuffer,
         rsm: ReflectiveShadowMap,
         light_count: int,
+        accumulated: LightAccumulation | None,
         direct_irradiance: moderngl.Texture,
     ) -> None:
         camera.bind_gbuffer(self._program, gbuffer, 0)
         rsm.bind(self._program, 2)
-        set_uniforms(self._program, light_count=light_count)
+        set_uniforms(self._program, light_count=light_count, light_accumulation=5)
+        if accumulated is None:
+            set_uniforms(self._program, accumulation_unit=0.0)
+        else:
+            accumulated.texture.use(5)
+            set_uniforms(self._program, accumulation_unit=accumulated.unit)
         direct_irradiance.bind_to_image(0, read=False, write=True)
         self._program.run(-(-direct_irradiance.width // 8), -(-direct_irradiance.height // 8))
         self._context.memory_barrier(self._context.TEXTURE_FETCH_BARRIER_BIT)

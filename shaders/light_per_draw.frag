@@ -1,0 +1,15 @@
+// Irradiance of one light at every pixel of the picture, blended over all draws.
+#include "common/dynamic_lights.glsl"
+#include "common/gbuffer.glsl"
+
+uniform int light_index;
+uniform float accumulation_unit;
+
+layout(location = 0) out vec4 out_accumulation;
+
+void main() {
+    Receiver receiver = gbuffer_receiver(ivec2(gl_FragCoord.xy));
+    vec3 irradiance =
+        dynamic_light_irradiance(dynamic_lights[light_index], receiver.position_world, receiver.normal_world);
+    out_accumulation = vec4(receiver.valid ? irradiance / accumulation_unit : vec3(0.0), 0.0);
+}

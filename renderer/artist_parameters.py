@@ -113,6 +113,28 @@ ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
         fitted=True,
     ),
     ParameterSpec(
+        name="visibility_bias",
+        symbol="β",
+        default=0.02,
+        low=0.0,
+        high=0.5,
+        scale="linear",
+        unit="of the distance",
+        meaning="how far before a surface a blocker must stand to shade it, where VPLs have visibility maps",
+        fitted=False,
+    ),
+    ParameterSpec(
+        name="visibility_softness",
+        symbol="σ",
+        default=0.02,
+        low=0.001,
+        high=0.5,
+        scale="log",
+        unit="of the distance",
+        meaning="over which share of the distance light fades in behind a blocker's edge",
+        fitted=False,
+    ),
+    ParameterSpec(
         name="vpl_count",
         symbol="N",
         default=1024,
@@ -179,6 +201,8 @@ class ArtistParameters:
     intensity: float = float(_SPECS["intensity"].default)
     falloff_footprint: float = float(_SPECS["falloff_footprint"].default)
     falloff_transmittance: float = float(_SPECS["falloff_transmittance"].default)
+    visibility_bias: float = float(_SPECS["visibility_bias"].default)
+    visibility_softness: float = float(_SPECS["visibility_softness"].default)
     vpl_count: int = int(_SPECS["vpl_count"].default)
     density_exponent: float = float(_SPECS["density_exponent"].default)
     screen_space_radius: float = float(_SPECS["screen_space_radius"].default)

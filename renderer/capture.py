@@ -33,6 +33,8 @@ class CapturedFrame:
     """Radius of the disc that the VPL stands for."""
     vpl_flux: Float32[np.ndarray, "vpls 3"]
     """Reflected radiant flux [W]."""
+    visibility_maps: Float32[np.ndarray, "vpls size size"] | None
+    """Distance to the nearest surface, in units of L, over each VPL's hemisphere; None without maps."""
     scene_length: float
     """L: flux-weighted RMS distance of the lit RSM texels from their centroid."""
 
@@ -59,8 +61,17 @@ def capture_frame(frame: Frame, view: View) -> CapturedFrame:
         vpl_normal_world=vpls[:, 4:7],
         vpl_footprint=vpls[:, 3],
         vpl_flux=vpls[:, 8:11],
+        visibility_maps=_visibility_maps(frame),
         scene_length=float(statistics[2]),
     )
+
+
+def _visibility_maps(frame: Frame) -> Float32[np.ndarray, "vpls size size"] | None:
+    if frame.vpl_visibility_maps is None:
+        return None
+    texels = np.frombuffer(frame.vpl_visibility_maps.maps.read(), np.float32)
+    size = frame.vpl_visibility_maps.size
+    return texels.reshape(-1, size, size)
 
 
 _DTYPES = {"f1": np.uint8, "f2": np.float16, "f4": np.float32, "nu2": np.uint16}

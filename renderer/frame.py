@@ -1,6 +1,6 @@
 """One frame, as the diagram has it.
 
-G-buffer ► lights ► RSM ► VPLs ► gather ► filter ► screen-space ► resolve ► tone curve.
+G-buffer ► lights ► RSM ► VPLs ► visibility maps ► gather ► filter ► screen-space ► resolve ► tone curve.
 """
 
 import moderngl
@@ -22,6 +22,8 @@ from renderer.passes.screen_space_indirect import ScreenSpaceIndirectPass
 from renderer.passes.tone_mapping import ToneMappingPass
 from renderer.passes.virtual_point_lights import VirtualPointLightsPass
 from renderer.passes.vpl_gather import VplGatherPass
+from renderer.passes.vpl_visibility_maps import VplVisibilityMapsPass
+from renderer.ray_hierarchy import RayHierarchy
 from renderer.render_targets import (
     create_display_target,
     create_gbuffer,
@@ -49,6 +51,7 @@ class Frame:
         face_count: int,
         vpl_count: int,
         options: RuntimeOptions,
+        hierarchy: RayHierarchy | None,
     ):
         self._context = context
         self._scene = scene
@@ -70,7 +73,12 @@ class Frame:
         self._reflective_shadow_map = ReflectiveShadowMapPass(context, scene)
         self.virtual_point_lights = VirtualPointLightsPass(context, self.rsm, vpl_count)
         self._direct_light = DirectLightPass(context, rsm_resolution)
-        self._vpl_gather = VplGatherPass(context, options.interleave)
+        self._hierarchy = hierarchy
+        self.vpl_visibility_maps: VplVisibilityMapsPass | None = None
+        if hierarchy is not None:
+            self.vpl_visibility_maps = VplVisibilityMapsPass(context, vpl_count, options.visibility_map_size)
+        map_size = options.visibility_map_size if hierarchy is not None else 0
+        self._vpl_gather = VplGatherPass(context, options.interleave, map_size)
         self._interleaved_filter: InterleavedFilterPass | None = None
         if options.interleave > 1:
             self._pixel_list = create_pixel_list(context, size)
@@ -97,6 +105,7 @@ class Frame:
         self.virtual_point_lights.draw(
             self.rsm, records.moment_origin, parameters.density_exponent, table_rotation
         )
+        self._cast_visibility_maps()
         self._direct_light.draw(
             camera, self.gbuffer, self.rsm, len(view.lights), accumulated, self.direct_irradiance
         )
@@ -120,6 +129,12 @@ class Frame:
     def camera(self, view: View) -> CameraUniforms:
         """The view's camera as the shaders know it."""
         return camera_uniforms(view.camera, self.size, self._scene.bounds())
+
+    def _cast_visibility_maps(self) -> None:
+        if self.vpl_visibility_maps is not None and self._hierarchy is not None:
+            self._hierarchy.update()
+            low, high = self._scene.bounds()
+            self.vpl_visibility_maps.draw(self._hierarchy, float(np.linalg.norm(high - low)))
 
     def _gather(self, camera: CameraUniforms, parameters: ArtistParameters) -> None:
         count, picture = self.virtual_point_lights.count, self.vpl_irradiance

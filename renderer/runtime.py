@@ -2,6 +2,7 @@
 
 import functools
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -13,10 +14,11 @@ from renderer.capture import CapturedFrame, capture_frame, read_picture
 from renderer.dynamic_lights import DynamicLights
 from renderer.frame import Frame, frame_light_records
 from renderer.gpu_context import check_errors, create_context
+from renderer.ray_hierarchy import RayHierarchy
 from renderer.runtime_options import RuntimeOptions
 from renderer.scene import Scene
 from renderer.scene_buffers import SceneBuffers
-from renderer.tuned_config import TunedConfig, read_config
+from renderer.tuned_config import TunedConfig, Visibility, read_config
 from renderer.views import View
 
 Layer = Literal["final", "direct", "indirect", "irradiance", "albedo", "normal", "depth"]
@@ -71,11 +73,14 @@ class Runtime:
         loaded = config if isinstance(config, TunedConfig) else read_config(config)
         self.options = options
         self.parameters: ArtistParameters = loaded.parameters
+        self.visibility: Visibility = loaded.visibility
         self._context = create_context() if context is None else context
         self._rsm_resolution = rsm_resolution
         self._context.__enter__()
         self.scene_buffers = SceneBuffers(self._context, scene)
-        self._frames: dict[tuple[tuple[int, int], int, int], Frame] = {}
+        self._hierarchy: RayHierarchy | None = None
+        self._scene = scene
+        self._frames: dict[tuple[tuple[int, int], int, int, bool], Frame] = {}
 
     @_on_own_context
     def render(
@@ -166,11 +171,15 @@ class Runtime:
     ) -> Frame:
         records = frame_light_records(self.scene_buffers, view)
         frame = self._frame(view.size, len(records.faces))
-        frame.draw(view, records, self.parameters, table_rotation, lights)
+        parameters = self.parameters
+        if self.visibility == "none":
+            parameters = replace(parameters, falloff_transmittance=0.0)
+        frame.draw(view, records, parameters, table_rotation, lights)
         return frame
 
     def _frame(self, size: tuple[int, int], face_count: int) -> Frame:
-        key = (size, face_count, self.parameters.vpl_count)
+        maps = self.visibility == "maps"
+        key = (size, face_count, self.parameters.vpl_count, maps)
         if key not in self._frames:
             # One frame's targets at a time: pictures of many sizes must not add up in GPU memory.
             self._frames.clear()
@@ -178,7 +187,16 @@ class Runtime:
             resolution = self._rsm_resolution
             if resolution is None:
                 resolution = RSM_RESOLUTION if face_count <= FEW_FACES else RSM_RESOLUTION_OF_MANY
+            if maps and self._hierarchy is None:
+                self._hierarchy = RayHierarchy(self._context, self._scene, self.scene_buffers)
             self._frames[key] = Frame(
-                self._context, self.scene_buffers, size, resolution, face_count, key[2], self.options
+                self._context,
+                self.scene_buffers,
+                size,
+                resolution,
+                face_count,
+                self.parameters.vpl_count,
+                self.options,
+                self._hierarchy if maps else None,
             )
         return self._frames[key]

@@ -23,8 +23,13 @@ class RuntimeOptions:
     """How dynamic lights are drawn: as blended volumes, in tiles, or in whichever of the two is measured to
     be faster on this machine, when a frame first has that many lights."""
 
+    visibility_map_size: int = 16
+    """Texels along the side of a VPL's visibility map, in [4, 64], where the config asks for maps."""
+
     def __post_init__(self) -> None:
         if self.interleave not in get_args(Interleave):
             raise ValueError(f"interleave: must be one of {get_args(Interleave)}, got {self.interleave!r}")
+        if not 4 <= self.visibility_map_size <= 64:
+            raise ValueError(f"visibility_map_size: must be in [4, 64], got {self.visibility_map_size!r}")
         if self.light_path not in get_args(LightPath):
             raise ValueError(f"light_path: must be one of {get_args(LightPath)}, got {self.light_path!r}")

@@ -3,16 +3,17 @@
     {"format": "vpltune", "version": 1, "parameters": {"intensity": 1.0, ...}, "provenance": {...}}
 
 `parameters` holds every name of the table in `renderer.artist_parameters` and nothing else.
-`provenance` is optional, says where the numbers come from, and is never acted on.
+`visibility` ("none", "transmittance", "maps") says what stands for occluders; a file without it means
+"transmittance". `provenance` is optional, says where the numbers come from, and is never acted on.
 """
 
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
 from renderer.atomic_file import write_text_whole
@@ -24,6 +25,9 @@ DEFAULT_CONFIG_NAME = "default"
 # A real file is about 1 kB; the bound keeps a wrong path (a scene, a device) from being read whole.
 MAXIMUM_FILE_BYTES = 1 << 20
 
+Visibility = Literal["none", "transmittance", "maps"]
+VISIBILITIES: tuple[Visibility, ...] = get_args(Visibility)
+
 Provenance = Mapping[str, str | int | float]
 
 
@@ -34,6 +38,13 @@ class TunedConfig:
     parameters: ArtistParameters = field(default_factory=ArtistParameters)
     provenance: Provenance = field(default_factory=dict)
     """Free-form names to strings or finite numbers."""
+    visibility: Visibility = "transmittance"
+    """What stands for occluders between VPLs and surfaces: nothing, the mean transmittance exp(−κ·d/L), or a
+    small map of what each VPL sees, with the transmittance for what the maps cannot resolve."""
+
+    def seen_by(self, visibility: Visibility | None) -> "TunedConfig":
+        """The same config with another visibility; None keeps its own."""
+        return self if visibility is None else replace(self, visibility=visibility)
 
 
 def read_config(source: str | Path) -> TunedConfig:
@@ -79,6 +90,7 @@ def parse_config(text: str, where: str) -> TunedConfig:
     return TunedConfig(
         parameters=ArtistParameters.validated(parameters, f"{where}: parameters"),
         provenance=_checked_provenance(document.get("provenance", {}), where),
+        visibility=_checked_visibility(document.get("visibility", "transmittance"), where),
     )
 
 
@@ -101,6 +113,7 @@ def config_text(config: TunedConfig) -> str:
     document: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
+        "visibility": _checked_visibility(config.visibility, "config"),
         "parameters": parameters.as_dict(),
     }
     if config.provenance:
@@ -138,6 +151,11 @@ def config_schema() -> dict[str, Any]:
                 "additionalProperties": False,
                 "properties": properties,
             },
+            "visibility": {
+                "description": "What stands for occluders between VPLs and surfaces.",
+                "enum": list(VISIBILITIES),
+                "default": "transmittance",
+            },
             "provenance": {
                 "description": "Where the numbers come from; never acted on.",
                 "type": "object",
@@ -171,10 +189,18 @@ def _check_header(document: dict[str, Any], where: str) -> None:
         raise InputError(f"{where}: key 'version' must be a whole number from 1, got {version!r:.60}")
     if version > VERSION:
         raise InputError(f"{where}: key 'version' is {version!s:.20}, this program reads up to {VERSION}")
-    known = ("format", "version", "parameters", "provenance")
+    known = ("format", "version", "visibility", "parameters", "provenance")
     for key in document:
         if key not in known:
             raise InputError(f"{where}: unknown key {key!r:.60}; known are {', '.join(known)}")
+
+
+def _checked_visibility(visibility: Any, where: str) -> Visibility:
+    if visibility not in VISIBILITIES:
+        raise InputError(
+            f"{where}: key 'visibility' must be one of {', '.join(VISIBILITIES)}, got {visibility!r:.60}"
+        )
+    return visibility
 
 
 def _checked_provenance(provenance: Any, where: str) -> dict[str, str | int | float]:

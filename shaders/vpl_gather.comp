@@ -10,6 +10,9 @@
 const float PI = 3.14159265358979;
 #include "common/vpl_irradiance.glsl"
 #include "common/pixel_list.glsl"
+#if VISIBILITY_MAP_SIZE > 0
+#include "common/vpl_visibility.glsl"
+#endif
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -27,6 +30,12 @@ uniform float falloff_transmittance;
 const int SUBSETS = INTERLEAVE * INTERLEAVE;
 
 shared VirtualPointLight batch[64];
+#if VISIBILITY_MAP_SIZE > 0
+shared mat3 batch_frame[64];
+
+uniform float visibility_bias;
+uniform float visibility_softness;
+#endif
 
 ivec2 own_pixel(int subset) {
     if (LISTED_PIXELS != 0) {
@@ -51,12 +60,25 @@ void main() {
         int lane = int(gl_LocalInvocationIndex);
         if (start + lane < end) {
             batch[lane] = virtual_point_lights[start + lane];
+#if VISIBILITY_MAP_SIZE > 0
+            batch_frame[lane] = hemisphere_frame(batch[lane].normal_area.xyz);
+#endif
         }
         barrier();
         int count = min(64, end - start);
         for (int i = 0; i < count; ++i) {
-            irradiance += vpl_irradiance(
+            vec3 unoccluded = vpl_irradiance(
                 receiver.position_world, receiver.normal_world, batch[i], scene_length, parameters);
+#if VISIBILITY_MAP_SIZE > 0
+            // About half of all pairs face away from each other, and need no look at the map.
+            if (any(greaterThan(unoccluded, vec3(0.0)))) {
+                unoccluded *= vpl_visibility(
+                    receiver.position_world, receiver.normal_world, batch[i], batch_frame[i],
+                    (start + i) * (VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE), scene_length,
+                    VisibilityParameters(visibility_bias, visibility_softness));
+            }
+#endif
+            irradiance += unoccluded;
         }
         barrier();
     }

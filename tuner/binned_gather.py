@@ -16,10 +16,17 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Float32
 
 from tuner.virtual_point_lights import Receivers, VirtualPointLights
 from tuner.vpl_gather import FalloffParameters, pair_geometry
+
+Visibility = (
+    Bool[np.ndarray, "receivers vpls"]
+    | Float32[np.ndarray, "receivers vpls"]
+    | Float[Array, "receivers vpls"]
+)
+"""Share of each VPL's light that reaches each receiver, in [0, 1]."""
 
 DISTANCE_NODES = 24
 FOOTPRINT_NODES = 8
@@ -45,13 +52,13 @@ class BinnedGather:
 def bin_vpls(
     receivers: Receivers,
     vpls: VirtualPointLights,
-    visibility: Bool[np.ndarray, "receivers vpls"] | None = None,
+    visibility: Visibility | None = None,
 ) -> BinnedGather:
     """Sum every receiver's VPLs onto the grid; done once for each placement of the VPLs.
 
     Args:
         receivers, vpls: in units of L.
-        visibility: true where receiver and VPL see each other; None for all.
+        visibility: share of each VPL's light that reaches each receiver; None for all of it.
     """
     distance, footprint = _grid(receivers, vpls)
     footprint_weight = np.stack(

@@ -55,6 +55,7 @@ def evaluate_scene(scene_path: Path, options: EvaluateOptions, progress: Progres
     document = {
         "scene": str(scene_path),
         "parameters": options.tuned.parameters.as_dict(),
+        "visibility": options.tuned.visibility,
         "views": str(views_path),
         "metrics": evaluation.summary(),
         "seconds": {**watch.report(), "fit": 0.0},

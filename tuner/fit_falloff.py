@@ -16,6 +16,7 @@ from tuner.losses.relative_squared_error import EVEN_SHARE, Target, target_of, w
 from tuner.search_space import SearchSpace
 from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_gather import FalloffParameters
+from tuner.vpl_visibility import map_visibility
 
 Data = tuple[tuple[BinnedGather, Target], ...]
 
@@ -39,14 +40,14 @@ def fit_falloff(
         views: what to fit to; at least one.
         start: where to begin, and what the other parameters stay at.
         seed: of the choice of pixels.
-        visibility: for each view, of every valid pixel and VPL; None takes all as visible, as the
-            runtime does.
+        visibility: for each view, of every valid pixel and VPL; None takes what the runtime itself knows
+            of it, from the views' visibility maps where they have them.
         even_share: weight of plain squared error beside relMSE, see `tuner.losses`.
         progress: called with the share done, in [0, 1].
     """
     space = SearchSpace()
     data = tuple(
-        _binned_view(view, seed + index, even_share, None if visibility is None else visibility[index])
+        _binned_view(view, seed + index, even_share, start, None if visibility is None else visibility[index])
         for index, view in enumerate(views)
     )
     point = space.point(start)
@@ -59,11 +60,19 @@ def fit_falloff(
 
 
 def _binned_view(
-    view: CapturedView, seed: int, even_share: float, visibility: Bool[np.ndarray, "receivers vpls"] | None
+    view: CapturedView,
+    seed: int,
+    even_share: float,
+    parameters: ArtistParameters,
+    visibility: Bool[np.ndarray, "receivers vpls"] | None,
 ) -> tuple[BinnedGather, Target]:
     pixels = view.fitted_pixels(RECEIVERS_PER_VIEW, seed)
     receivers, vpls = gather_inputs(view.captured, pixels)
-    binned = bin_vpls(receivers, vpls, None if visibility is None else visibility[pixels])
+    if visibility is None:
+        seen = map_visibility(view.captured, receivers, vpls, parameters)
+    else:
+        seen = visibility[pixels]
+    binned = bin_vpls(receivers, vpls, seen)
     flat = np.flatnonzero(view.captured.valid.ravel())[pixels]
     halves = (view.reference.irradiance_a, view.reference.irradiance_b)
     return binned, target_of(*(half.reshape(-1, 3)[flat] for half in halves), even_share)

@@ -98,7 +98,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
             seed=options.seed,
             progress=lambda share: progress("evaluate", share),
         )
-    config = TunedConfig(tuned, _provenance(prepared, options, descent))
+    config = TunedConfig(tuned, _provenance(prepared, options, descent), options.start.visibility)
     write_views(output / "views.json", str(scene_path), tuple(view.view for view in prepared.views))
     write_comparison(
         output / "comparison.png", prepared.runtime, _first_of_each_split(evaluation), PANEL_HEIGHT
@@ -107,6 +107,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
     document = {
         "scene": str(scene_path),
         "parameters": tuned.as_dict(),
+        "visibility": config.visibility,
         "views": str(output / "views.json"),
         "metrics": evaluation.summary(),
         "seconds": watch.report(),

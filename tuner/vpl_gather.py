@@ -91,15 +91,15 @@ def gather(
     receivers: Receivers,
     vpls: VirtualPointLights,
     parameters: FalloffParameters,
-    visibility: Bool[Array, "receivers vpls"] | None = None,
+    visibility: Bool[Array, "receivers vpls"] | Float[Array, "receivers vpls"] | None = None,
 ) -> Float[Array, "receivers 3"]:
     """Indirect irradiance [W/m²] at every receiver from all VPLs.
 
     Args:
         receivers, vpls: in units of L (see `tuner.virtual_point_lights.gather_inputs`).
         parameters: k, α, κ.
-        visibility: true where receiver and VPL see each other; None takes that for granted, as the
-            runtime does.
+        visibility: share of each VPL's light that reaches each receiver; None takes all of it, as the
+            runtime does without visibility maps.
     """
     count = receivers.position.shape[0]
     chunks = -(-count // RECEIVER_CHUNK)

@@ -14,10 +14,12 @@ class VplGatherPass:
 
     `interleave` n: each pixel of an n×n block gathers from its own n²-th part of the VPLs, n² times as
     bright (Keller and Heidrich 2001). Such a picture is for the interleaved filter; 1 is the full gather.
+    `visibility_map_size`: texels along the side of the VPLs' visibility maps; 0 looks at none.
     """
 
-    def __init__(self, context: moderngl.Context, interleave: int = 1):
+    def __init__(self, context: moderngl.Context, interleave: int = 1, visibility_map_size: int = 0):
         self._context = context
+        self._visibility_map_size = visibility_map_size
         self._interleave = interleave
         self._program = self._load(interleave, listed_pixels=False)
         self._listed_program = self._load(1, listed_pixels=True) if interleave > 1 else None
@@ -58,6 +60,7 @@ class VplGatherPass:
             **buffer_bindings.DEFINES,
             "INTERLEAVE": interleave,
             "LISTED_PIXELS": listed_pixels,
+            "VISIBILITY_MAP_SIZE": self._visibility_map_size,
         }
         return load_compute(self._context, "vpl_gather", defines)
 
@@ -77,5 +80,7 @@ class VplGatherPass:
             intensity=parameters.intensity,
             falloff_footprint=parameters.falloff_footprint,
             falloff_transmittance=parameters.falloff_transmittance,
+            visibility_bias=parameters.visibility_bias,
+            visibility_softness=parameters.visibility_softness,
         )
         irradiance.bind_to_image(0, read=False, write=True)

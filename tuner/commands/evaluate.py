@@ -20,6 +20,7 @@ from tuner.commands.options import (
     LookAtOption,
     SceneArgument,
     SeedOption,
+    VisibilityOption,
     YfovOption,
 )
 from tuner.commands.report import OK, PARTLY_DONE, Report, warn
@@ -32,6 +33,7 @@ def evaluate(
         str, typer.Option(metavar="N|FILE", help="How many views are fitted, or the views.json of a fit.")
     ] = "2",
     seed: SeedOption = 0,
+    visibility: VisibilityOption = None,
     bounces: Annotated[
         Bounces, typer.Option(help="What to compare with: one bounce, or full global illumination.")
     ] = "1",
@@ -67,7 +69,7 @@ def evaluate(
         light_cone,
     )
     options = EvaluateOptions(
-        tuned=read_config(config),
+        tuned=read_config(config).seen_by(visibility),
         seed=seed,
         bounces=bounces,
         camera=camera_from_flags(flags),

@@ -20,6 +20,7 @@ from tuner.commands.options import (
     LookAtOption,
     SceneArgument,
     SeedOption,
+    VisibilityOption,
     YfovOption,
 )
 from tuner.commands.report import OK, PARTLY_DONE, Report, warn
@@ -36,6 +37,7 @@ def fit(
     ] = "default",
     views: Annotated[int, typer.Option(min=1, max=LARGEST_VIEW_COUNT, help="How many views to fit.")] = 2,
     seed: SeedOption = 0,
+    visibility: VisibilityOption = None,
     bounces: Annotated[
         Bounces, typer.Option(help="What to fit to: one bounce, or full global illumination.")
     ] = "1",
@@ -68,7 +70,7 @@ def fit(
         light_cone,
     )
     options = FitOptions(
-        start=read_config(config),
+        start=read_config(config).seen_by(visibility),
         views=views,
         seed=seed,
         bounces=bounces,

@@ -26,6 +26,10 @@ SceneArgument = Annotated[
 JsonOption = Annotated[
     bool, typer.Option("--json", help="Print one JSON object on stdout, everything else on stderr.")
 ]
+VisibilityOption = Annotated[
+    Literal["none", "transmittance", "maps"] | None,
+    typer.Option(help="What stands for occluders of VPLs; else what the config says.", show_default=False),
+]
 SeedOption = Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of everything random.")]
 
 VIEW_PANEL = "Camera and light, in world units (else: the scene's own, or chosen)"

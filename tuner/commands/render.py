@@ -18,6 +18,7 @@ from tuner.commands.options import (
     LightTypeOption,
     LookAtOption,
     SceneArgument,
+    VisibilityOption,
     YfovOption,
     checked_scale,
     parse_size,
@@ -44,6 +45,7 @@ def render(
     config: Annotated[str, typer.Option(metavar="FILE", help="A tuned config, or `default`.")] = "default",
     layer: Annotated[Layer, typer.Option(help="Which picture to draw.")] = "final",
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Picture size. [960x540]")] = None,
+    visibility: VisibilityOption = None,
     interleave: Annotated[
         int, typer.Option(metavar="1|2|4|8", help="Blocks of NxN pixels share the VPLs out: faster above 1.")
     ] = 1,
@@ -85,7 +87,7 @@ def render(
     factor = checked_scale(scale)
     if interleave not in (1, 2, 4, 8):
         raise InputError(f"--interleave: must be 1, 2, 4 or 8, got {interleave}")
-    tuned = read_config(config)
+    tuned = read_config(config).seen_by(visibility)
     from_file = _view_from_file(views, view, flags)
     camera, light = camera_from_flags(flags), light_from_flags(flags)
 

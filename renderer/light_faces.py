@@ -130,8 +130,10 @@ def _face(
 
 def _rotation_along(direction: np.ndarray) -> Float64[np.ndarray, "3 3"]:
     """A rotation whose −Z axis is `direction` (unit)."""
-    backward = -np.asarray(direction, np.float64)
-    helper = np.array([0.0, 1.0, 0.0]) if abs(backward[1]) < 0.9 else np.array([1.0, 0.0, 0.0])
-    right = np.cross(helper, backward)
-    right /= np.linalg.norm(right)
-    return np.stack([right, np.cross(backward, right), backward], axis=1)
+    x, y, z = (-float(component) for component in direction)
+    # Right is the cross product of +Y with backward, or of +X where the light is near vertical; written out,
+    # because np.cross takes longer than all the rest of a frame's lights.
+    right = (z, 0.0, -x) if abs(y) < 0.9 else (0.0, -z, y)
+    length = math.hypot(*right)
+    u, v, w = (component / length for component in right)
+    return np.array([[u, y * w - z * v, x], [v, z * u - x * w, y], [w, x * v - y * u, z]])

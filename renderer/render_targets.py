@@ -15,6 +15,10 @@ class GBuffer:
 
     depth: float32, near/distance along the axis, 0 where nothing is hit. normal: octahedral, 2×16 bit.
     albedo: half float, alpha 1 where something is hit.
+
+    Albedo could wait for a second look at the materials, a draw of the scene against equal depth. Measured at
+    1080p on three scenes (llvmpipe), two draws took 13 to 44 % longer than one with three targets; on a GPU
+    the target's 8 bytes a pixel are some 10 µs of bandwidth, less than a draw of the scene.
     """
 
     depth: moderngl.Texture

@@ -108,6 +108,7 @@ class SceneBuffers:
             joint_matrices: of all skins, one after the other.
         """
         self._bounds = self._boxes.bounds(transforms, joint_matrices)
+        self.transforms, self.joint_matrices = transforms, joint_matrices
         # GLSL matrices are stored column by column.
         self._records["to_world"] = transforms.transpose(0, 2, 1)
         self._records["normal_to_world"][:, :3, :3] = _normal_matrices(transforms).transpose(0, 2, 1)

@@ -103,12 +103,14 @@ def set_uniforms(program: moderngl.Program | moderngl.ComputeShader, **values: o
     Matrices are given as numpy arrays, row by row as mathematics writes them.
     """
     for name, value in values.items():
-        if name not in program:
+        # `in` would walk through all names.
+        uniform = program.get(name, None)
+        if uniform is None:
             continue
         if isinstance(value, np.ndarray):
-            program[name].write(np.ascontiguousarray(value.T, np.float32).tobytes())
+            uniform.write(np.ascontiguousarray(value.T, np.float32))
         else:
-            program[name] = value
+            uniform.value = value
 
 
 def _glsl_literal(value: Define) -> str:

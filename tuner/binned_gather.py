@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Float32
+from jaxtyping import Array, Bool, Float
 
 from tuner.virtual_point_lights import Receivers, VirtualPointLights
 from tuner.vpl_gather import FalloffParameters, pair_geometry

@@ -13,7 +13,7 @@ from renderer.render_targets import GBuffer, create_light_accumulation_target
 from renderer.shader_library import load_compute, set_uniforms
 
 TILE_SIZE = 16
-CELL_TILES = 8
+CELL_TILES = 4
 GROUP_SIZE = 256
 CULL_BATCH = 2048
 """Lights that one workgroup tests against one cell."""

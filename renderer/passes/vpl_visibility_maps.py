@@ -1,4 +1,4 @@
-"""VPL visibility maps: what every VPL sees, as a small hemispherical map of distances, cast anew each frame."""
+"""VPL visibility maps: what every VPL sees, a small hemispherical map of distances, cast anew each frame."""
 
 import moderngl
 

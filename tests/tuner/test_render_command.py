@@ -83,6 +83,20 @@ def test_exr_of_final_is_the_radiance_before_the_tone_curve(views_path, tmp_path
     np.testing.assert_allclose(pixels["final"], total, rtol=2e-3, atol=1e-3 * total.mean())
 
 
+def test_dynamic_lights_add_to_direct_light_only(views_path, tmp_path):
+    pixels = {}
+    for layer in ("direct", "indirect"):
+        for count in ("0", "100"):
+            name = f"{layer}{count}.exr"
+            assert render(views_path, tmp_path / name, "--layer", layer, "--dynamic-lights", count) == 0
+            pixels[layer, count] = read_exr(tmp_path / name)
+    added = pixels["direct", "100"] - pixels["direct", "0"]
+    assert (added >= 0.0).all()
+    # They stand out beside the light of the view, and do not outshine it.
+    assert 0.02 < added.mean() / pixels["direct", "0"].mean() < 1.0
+    np.testing.assert_array_equal(pixels["indirect", "100"], pixels["indirect", "0"])
+
+
 def test_pictures_of_a_scaled_scene_are_the_same(views_path, tmp_path):
     for name, scale in (("one.exr", "1"), ("hundred.exr", "100")):
         assert render(views_path, tmp_path / name, "--layer", "irradiance", "--scale", scale) == 0

@@ -26,12 +26,15 @@ from tuner.commands.options import (
 from tuner.commands.report import Report, warn
 
 if TYPE_CHECKING:
+    from renderer.dynamic_lights import DynamicLights
     from renderer.runtime import Runtime
     from renderer.scene import Camera, Light, Scene
     from renderer.views import View
     from tuner.commands.view_flags import ViewFlags
 
 DEFAULT_SIZE = (960, 540)
+LARGEST_DYNAMIC_LIGHT_COUNT = 1_000_000
+DYNAMIC_LIGHT_SEED = 0
 
 
 def render(
@@ -49,6 +52,12 @@ def render(
     interleave: Annotated[
         int, typer.Option(metavar="1|2|4|8", help="Blocks of NxN pixels share the VPLs out: faster above 1.")
     ] = 1,
+    dynamic_lights: Annotated[
+        int,
+        typer.Option(
+            metavar="N", min=0, max=LARGEST_DYNAMIC_LIGHT_COUNT, help="Add N small lights that fly about."
+        ),
+    ] = 0,
     scale: Annotated[float, typer.Option(help="Draw scene, camera and light this much larger.")] = 1.0,
     views: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Take camera, lights and size from a views.json.")
@@ -105,7 +114,7 @@ def render(
     if factor != 1.0:
         loaded, drawn = scaled(loaded, factor), scaled_view(drawn, factor)
     runtime = Runtime(loaded, tuned, RuntimeOptions(interleave=interleave))
-    _write_layer(runtime, drawn, layer, output)
+    _write_layer(runtime, drawn, layer, output, _dynamic_lights(loaded, drawn, dynamic_lights))
     return _report(scene, output, layer, tuned.parameters.as_dict(), drawn)
 
 
@@ -141,15 +150,31 @@ def _placed_view(
     return View("main", "fitted", DEFAULT_SIZE, camera, lights)
 
 
-def _write_layer(runtime: "Runtime", view: "View", layer: Layer, output: Path) -> None:
+def _dynamic_lights(scene: "Scene", view: "View", count: int) -> "DynamicLights | None":
+    from renderer.dynamic_lights import DynamicLights
+    from renderer.light_motion import BouncingLights, flux_beside
+
+    if not count:
+        return None
+    flux = flux_beside(scene, view.lights)
+    return DynamicLights(BouncingLights(scene, count, DYNAMIC_LIGHT_SEED, flux).records)
+
+
+def _write_layer(
+    runtime: "Runtime", view: "View", layer: Layer, output: Path, lights: "DynamicLights | None"
+) -> None:
     from renderer.image_file import write_exr, write_png
 
     if output.suffix.lower() == ".exr":
         # The final picture without its tone curve is the radiance that reaches the eye.
-        pixels = runtime.render_radiance(view) if layer == "final" else runtime.render(view, layer)
+        pixels = (
+            runtime.render_radiance(view, lights)
+            if layer == "final"
+            else runtime.render(view, layer, lights=lights)
+        )
         write_exr(output, pixels, "Z" if layer == "depth" else "Y")
     else:
-        write_png(output, _for_display(runtime, layer, runtime.render(view, layer)))
+        write_png(output, _for_display(runtime, layer, runtime.render(view, layer, lights=lights)))
 
 
 def _for_display(runtime: "Runtime", layer: Layer, pixels: Any) -> Any:

@@ -12,6 +12,9 @@ from tuner.virtual_point_lights import Receivers, VirtualPointLights
 
 VISIBILITY_LIFT = 0.01
 """Footprints by which a map's origin is lifted off the VPL's surface; twin of the shader's constant."""
+VISIBILITY_NEAREST = 0.5
+VISIBILITY_FARTHEST = 1.5
+"""Shares of the receiver's distance at which a texel's axis may meet its plane; twins of the shader's."""
 CHUNK = 128
 """Receivers at once: 128 × 1,024 pairs with four texels each are 2 MiB an array."""
 
@@ -74,7 +77,7 @@ def vpl_visibility(
 
     The four texels around the receiver's direction are compared each along its own axis with the receiver's
     tangent plane, so that a coarse map does not shade the plane it shows (receiver plane depth bias, Isidoro
-    2006).
+    2006); an axis that misses the plane, with the receiver's distance.
 
     Args:
         receivers, vpls, maps: lengths in units of L.
@@ -93,6 +96,7 @@ def vpl_visibility(
         direction = jnp.einsum("rvk,vak->rva", to_receiver, frame, precision="highest")
         normal_vpl = jnp.einsum("rk,vak->rva", normal, frame, precision="highest")
         plane = (to_receiver * normal[:, None, :]).sum(-1)
+        distance = jnp.maximum(jnp.linalg.norm(to_receiver, axis=-1), 1e-9)
         asked = (direction[..., 2] > 0.0) & (plane < 0.0)
         # Where not asked, any finite direction serves.
         direction = jnp.where(asked[..., None], direction, jnp.array([0.0, 0.0, 1.0]))
@@ -106,8 +110,11 @@ def vpl_visibility(
             index = texel[..., 1] * size + texel[..., 0]
             slope = (axes[index] * normal_vpl).sum(-1)
             share = jnp.prod(jnp.where(step == 1, blend, 1.0 - blend), axis=-1)
-            share = jnp.where(slope < -1e-4, share, 0.0)
-            lead = flat[first + index] * slope / jnp.where(asked, plane, -1.0) - 1.0 + parameters.bias
+            meets = slope < -1e-4
+            reach = jnp.where(meets, plane / (jnp.where(meets, slope, -1.0) * distance), 1.0)
+            share = jnp.where(reach > VISIBILITY_NEAREST, share, 0.0)
+            lead = flat[first + index] / (distance * jnp.minimum(reach, VISIBILITY_FARTHEST))
+            lead = lead - 1.0 + parameters.bias
             visible += share * jnp.clip(lead / parameters.softness + 0.5, 0.0, 1.0)
             weights += share
         seen = jnp.where(weights > 1e-4, visible / jnp.maximum(weights, 1e-4), 1.0)

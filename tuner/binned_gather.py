@@ -21,11 +21,7 @@ from jaxtyping import Array, Bool, Float
 from tuner.virtual_point_lights import Receivers, VirtualPointLights
 from tuner.vpl_gather import FalloffParameters, pair_geometry
 
-Visibility = (
-    Bool[np.ndarray, "receivers vpls"]
-    | Float32[np.ndarray, "receivers vpls"]
-    | Float[Array, "receivers vpls"]
-)
+Visibility = Bool[np.ndarray, "receivers vpls"] | Float[Array, "receivers vpls"]
 """Share of each VPL's light that reaches each receiver, in [0, 1]."""
 
 DISTANCE_NODES = 24

@@ -39,7 +39,7 @@ def test_glsl_is_ascii_and_says_names_and_units():
 
 def test_glsl_names():
     names = [glsl_name(spec) for spec in ARTIST_PARAMETERS]
-    assert names[3:6] == ["VPL_COUNT", "VPL_DENSITY_EXPONENT", "VPL_SCREEN_SPACE_RADIUS"]
+    assert names[3:6] == ["VPL_VISIBILITY_BIAS", "VPL_VISIBILITY_SOFTNESS", "VPL_COUNT"]
 
 
 def test_an_out_of_range_config_is_not_exported():

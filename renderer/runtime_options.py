@@ -5,6 +5,7 @@ from typing import Literal, get_args
 
 Interleave = Literal[1, 2, 4, 8]
 LightPath = Literal["auto", "volumes", "tiles"]
+RsmFiltering = Literal[1, 2, 4, 8]
 
 
 @dataclass(frozen=True)
@@ -23,8 +24,20 @@ class RuntimeOptions:
     """How dynamic lights are drawn: as blended volumes, in tiles, or in whichever of the two is measured to
     be faster on this machine, when a frame first has that many lights."""
 
+    rsm_filtering: RsmFiltering = 4
+    """RSM texels along the side of the block whose light a VPL has. 1 takes it from one texel: colour and
+    place then change by whole texels when the light moves."""
+
+    rsm_snapping: bool = True
+    """Whether a directional light's RSM keeps its grid while bounds move: its size changes in steps, its
+    place by whole blocks of texels. Otherwise it fits the bounds, and shadows and VPLs crawl with them."""
+
     def __post_init__(self) -> None:
         if self.interleave not in get_args(Interleave):
             raise ValueError(f"interleave: must be one of {get_args(Interleave)}, got {self.interleave!r}")
         if self.light_path not in get_args(LightPath):
             raise ValueError(f"light_path: must be one of {get_args(LightPath)}, got {self.light_path!r}")
+        if self.rsm_filtering not in get_args(RsmFiltering):
+            raise ValueError(
+                f"rsm_filtering: must be one of {get_args(RsmFiltering)}, got {self.rsm_filtering!r}"
+            )

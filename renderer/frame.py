@@ -10,7 +10,7 @@ from renderer import buffer_bindings
 from renderer.artist_parameters import ArtistParameters
 from renderer.camera_uniforms import CameraUniforms, camera_uniforms
 from renderer.dynamic_lights import DynamicLights
-from renderer.light_faces import FACE_DTYPE, LIGHT_DTYPE, LightRecords, light_records
+from renderer.light_faces import FACE_DTYPE, LIGHT_DTYPE, FaceSnapping, LightRecords, light_records
 from renderer.light_pre_pass import LightPrePass
 from renderer.passes.direct_light import DirectLightPass
 from renderer.passes.geometry import GeometryPass
@@ -71,7 +71,9 @@ class Frame:
         self._geometry = GeometryPass(context, scene)
         self.light_pre_pass = LightPrePass(context, self.gbuffer, options.light_path)
         self._reflective_shadow_map = ReflectiveShadowMapPass(context, scene)
-        self.virtual_point_lights = VirtualPointLightsPass(context, self.rsm, vpl_count)
+        self.virtual_point_lights = VirtualPointLightsPass(
+            context, self.rsm, vpl_count, options.rsm_filtering
+        )
         self._direct_light = DirectLightPass(context, rsm_resolution)
         self._hierarchy = hierarchy
         self.vpl_visibility_maps: VplVisibilityMapsPass | None = None
@@ -182,6 +184,13 @@ class Frame:
         self._faces.bind_to_storage_buffer(buffer_bindings.RSM_FACES)
 
 
-def frame_light_records(scene: SceneBuffers, view: View) -> LightRecords:
-    """The view's lights as records for the scene as it stands."""
-    return light_records(view.lights, scene.bounds())
+def frame_light_records(scene: SceneBuffers, view: View, snapped_cells: int | None = None) -> LightRecords:
+    """The view's lights as records for the scene as it stands.
+
+    `snapped_cells` along the side of an orthographic face keep their places in the world while things
+    move; None fits the face to the scene.
+    """
+    if snapped_cells is None:
+        return light_records(view.lights, scene.bounds())
+    length = float(np.linalg.norm(scene.rest_bounds[1] - scene.rest_bounds[0]))
+    return light_records(view.lights, scene.bounds(), FaceSnapping(length, snapped_cells))

@@ -49,6 +49,20 @@ _CUBE = np.array(
 """Rotations whose −Z axes (third columns negated) are ∓X, ∓Y, ∓Z."""
 
 
+SIZE_STEP = 2.0**0.125
+"""Ratio of one size of a snapped face to the next: at most a twelfth of the texels' density is given up."""
+
+
+@dataclass(frozen=True)
+class FaceSnapping:
+    """How an orthographic face keeps its grid in the world while bounds move."""
+
+    length: float
+    """What sizes are steps of: of the scene at rest, so that every scale of a scene has the same steps."""
+    cells: int
+    """Along the side of a face; it moves by whole ones."""
+
+
 @dataclass(frozen=True)
 class LightRecords:
     """Lights and faces as the shaders read them (shaders/common/lights.glsl)."""
@@ -59,12 +73,19 @@ class LightRecords:
     """A point near the light: sums of squared distances lose least precision from there."""
 
 
-def light_records(lights: tuple[Light, ...], bounds: Float64[np.ndarray, "2 3"]) -> LightRecords:
+def face_count(lights: tuple[Light, ...]) -> int:
+    """How many RSM faces the lights have, wherever they are."""
+    return sum(_face_count(light) for light in lights)
+
+
+def light_records(
+    lights: tuple[Light, ...], bounds: Float64[np.ndarray, "2 3"], snapping: FaceSnapping | None = None
+) -> LightRecords:
     """Lay out lights and RSM faces for a scene within `bounds` (low and high corner, world units)."""
     records = np.zeros(len(lights), LIGHT_DTYPE)
     faces: list[np.ndarray] = []
     for index, light in enumerate(lights):
-        own = _faces(light, index, bounds)
+        own = _faces(light, index, bounds, snapping)
         cos_inner, cos_outer = math.cos(light.inner_cone), math.cos(light.outer_cone)
         records[index] = (
             (*light.position_world, KIND_CODES[light.kind]),
@@ -78,22 +99,29 @@ def light_records(lights: tuple[Light, ...], bounds: Float64[np.ndarray, "2 3"])
     return LightRecords(records, all_faces, tuple(float(value) for value in origin))
 
 
-def _faces(light: Light, index: int, bounds: np.ndarray) -> list[np.ndarray]:
+def _face_count(light: Light) -> int:
+    if light.kind == "point":
+        return 6
+    # No spot reaches behind itself: of its cube, the last face would stay dark.
+    return 5 if light.kind == "spot" and light.outer_cone > WIDEST_SINGLE_FACE else 1
+
+
+def _faces(light: Light, index: int, bounds: np.ndarray, snapping: FaceSnapping | None) -> list[np.ndarray]:
     if light.kind == "directional":
-        return [_sun_face(light, index, bounds)]
+        return [_sun_face(light, index, bounds, snapping)]
     near = NEAR_PLANE * float(np.linalg.norm(bounds[1] - bounds[0])) / 2.0
-    if light.kind == "spot" and light.outer_cone <= WIDEST_SINGLE_FACE:
+    count = _face_count(light)
+    if count == 1:
         tan_outer = math.tan(light.outer_cone)
         rotation = _rotation_along(light.direction_world)
         return [_face(rotation, light.position_world, index, 0, (tan_outer, tan_outer), near)]
     rotations = _CUBE
     if light.kind == "spot":
-        # No spot reaches behind itself: of its cube, the last face stays dark.
-        rotations = _rotation_along(light.direction_world) @ _CUBE[:5]
+        rotations = _rotation_along(light.direction_world) @ _CUBE[:count]
     return [_face(rotation, light.position_world, index, 0, (1.0, 1.0), near) for rotation in rotations]
 
 
-def _sun_face(light: Light, index: int, bounds: np.ndarray) -> np.ndarray:
+def _sun_face(light: Light, index: int, bounds: np.ndarray, snapping: FaceSnapping | None) -> np.ndarray:
     """An orthographic face that holds all of `bounds`, as seen along the light."""
     rotation = _rotation_along(light.direction_world)
     selector = np.array([[(corner >> axis) & 1 for axis in range(3)] for corner in range(8)])
@@ -105,7 +133,19 @@ def _sun_face(light: Light, index: int, bounds: np.ndarray) -> np.ndarray:
     extent = (high - low) / 2.0 + room
     front = (low + high) / 2.0
     front[2] = high[2] + room
+    if snapping is not None:
+        extent[:2], front[:2] = _snapped(extent[:2], front[:2], snapping)
     return _face(rotation, rotation @ front, index, 1, (extent[0], extent[1]), 2.0 * extent[2])
+
+
+def _snapped(extent: np.ndarray, center: np.ndarray, snapping: FaceSnapping) -> tuple[np.ndarray, np.ndarray]:
+    """The next larger size, and the nearest place on that size's grid about the world's origin."""
+    # A place is rounded by half a cell, 1/cells of the extent.
+    needed = extent * (1.0 + 1.0 / (snapping.cells - 1.0))
+    steps = np.ceil(np.log(needed / snapping.length) / math.log(SIZE_STEP))
+    extent = snapping.length * SIZE_STEP**steps
+    cell = 2.0 * extent / snapping.cells
+    return extent, np.round(center / cell) * cell
 
 
 def _face(
@@ -129,11 +169,17 @@ def _face(
 
 
 def _rotation_along(direction: np.ndarray) -> Float64[np.ndarray, "3 3"]:
-    """A rotation whose −Z axis is `direction` (unit)."""
+    """A rotation whose −Z axis is `direction` (unit).
+
+    It follows the direction without a jump and with little roll, so that a light that turns carries its
+    texels along: Frisvad 2012, with the one direction that any such rule must except straight up.
+    """
     x, y, z = (-float(component) for component in direction)
-    # Right is the cross product of +Y with backward, or of +X where the light is near vertical; written out,
-    # because np.cross takes longer than all the rest of a frame's lights.
-    right = (z, 0.0, -x) if abs(y) < 0.9 else (0.0, -z, y)
+    if y < -1.0 + 1e-9:
+        return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    # Written out, because np.cross takes longer than all the rest of a frame's lights.
+    shear = x / (1.0 + y)
+    right = (1.0 - x * shear, -x, -z * shear)
     length = math.hypot(*right)
     u, v, w = (component / length for component in right)
     return np.array([[u, y * w - z * v, x], [v, z * u - x * w, y], [w, x * v - y * u, z]])

@@ -1,6 +1,7 @@
 """The runtime: a scene and a tuned config in, pictures out."""
 
 import functools
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from renderer.capture import CapturedFrame, capture_frame, read_picture
 from renderer.dynamic_lights import DynamicLights
 from renderer.frame import Frame, frame_light_records
 from renderer.gpu_context import check_errors, create_context
+from renderer.light_faces import face_count
 from renderer.ray_hierarchy import RayHierarchy
 from renderer.runtime_options import RuntimeOptions
 from renderer.scene import Scene
@@ -169,7 +171,7 @@ class Runtime:
         table_rotation: tuple[float, float] = (0.0, 0.0),
         lights: DynamicLights | None = None,
     ) -> Frame:
-        records = frame_light_records(self.scene_buffers, view)
+        records = frame_light_records(self.scene_buffers, view, self._snapped_cells(view))
         frame = self._frame(view.size, len(records.faces))
         parameters = self.parameters
         if self.visibility == "none":
@@ -184,9 +186,7 @@ class Runtime:
             # One frame's targets at a time: pictures of many sizes must not add up in GPU memory.
             self._frames.clear()
             self._context.gc()
-            resolution = self._rsm_resolution
-            if resolution is None:
-                resolution = RSM_RESOLUTION if face_count <= FEW_FACES else RSM_RESOLUTION_OF_MANY
+            resolution = self._face_resolution(face_count)
             if maps and self._hierarchy is None:
                 self._hierarchy = RayHierarchy(self._context, self._scene, self.scene_buffers)
             self._frames[key] = Frame(
@@ -200,3 +200,14 @@ class Runtime:
                 self._hierarchy if maps else None,
             )
         return self._frames[key]
+
+    def _face_resolution(self, face_count: int) -> int:
+        if self._rsm_resolution is not None:
+            return self._rsm_resolution
+        return RSM_RESOLUTION if face_count <= FEW_FACES else RSM_RESOLUTION_OF_MANY
+
+    def _snapped_cells(self, view: View) -> int | None:
+        if not self.options.rsm_snapping:
+            return None
+        resolution = self._face_resolution(face_count(view.lights))
+        return resolution // math.gcd(resolution, self.options.rsm_filtering)

@@ -5,6 +5,7 @@ from typing import Literal, get_args
 
 Interleave = Literal[1, 2, 4, 8]
 LightPath = Literal["auto", "volumes", "tiles"]
+RsmFiltering = Literal[1, 2, 4, 8]
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,14 @@ class RuntimeOptions:
     visibility_map_size: int = 16
     """Texels along the side of a VPL's visibility map, in [4, 64], where the config asks for maps."""
 
+    rsm_filtering: RsmFiltering = 4
+    """RSM texels along the side of the block whose light a VPL has. 1 takes it from one texel: colour and
+    place then change by whole texels when the light moves."""
+
+    rsm_snapping: bool = True
+    """Whether a directional light's RSM keeps its grid while bounds move: its size changes in steps, its
+    place by whole blocks of texels. Otherwise it fits the bounds, and shadows and VPLs crawl with them."""
+
     def __post_init__(self) -> None:
         if self.interleave not in get_args(Interleave):
             raise ValueError(f"interleave: must be one of {get_args(Interleave)}, got {self.interleave!r}")
@@ -33,3 +42,7 @@ class RuntimeOptions:
             raise ValueError(f"visibility_map_size: must be in [4, 64], got {self.visibility_map_size!r}")
         if self.light_path not in get_args(LightPath):
             raise ValueError(f"light_path: must be one of {get_args(LightPath)}, got {self.light_path!r}")
+        if self.rsm_filtering not in get_args(RsmFiltering):
+            raise ValueError(
+                f"rsm_filtering: must be one of {get_args(RsmFiltering)}, got {self.rsm_filtering!r}"
+            )

@@ -63,6 +63,28 @@ RsmTexel rsm_texel(ivec2 texel) {
     return result;
 }
 
+// Where the light's ray through a place of the atlas, counted in texels, meets the plane of the surface that
+// is seen in a texel beside it; the texel's own place where ray and plane are all but parallel.
+vec3 rsm_position_on_plane(RsmTexel texel, vec2 place) {
+    ivec2 tile = ivec2(place) / RSM_RESOLUTION;
+    RsmFace face = rsm_faces[tile.y * rsm_columns + tile.x];
+    mat3 rotation = mat3(face.light_to_world);
+    vec2 ndc = (place - vec2(tile * RSM_RESOLUTION)) * (2.0 / RSM_RESOLUTION) - 1.0;
+    vec3 across = rotation * vec3(ndc * face.extent, 0.0);
+    vec3 start = face.light_to_world[3].xyz;
+    vec3 ray = -rotation[2];
+    if (face.orthographic != 0) {
+        start += across;
+    } else {
+        ray += across;
+    }
+    float along = dot(texel.normal_world, ray);
+    if (along > -RSM_MIN_COSINE * length(ray)) {
+        return texel.position_world;
+    }
+    return start + ray * (dot(texel.normal_world, texel.position_world - start) / along);
+}
+
 // Flux as one number: the mean of the channels, since error counts the same in each of them.
 float mean_flux(vec3 flux) {
     return (flux.r + flux.g + flux.b) / 3.0;

@@ -82,7 +82,7 @@ def test_factored_gather_equals_its_definition(gl_context, light):
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_binned_gather_is_close(gl_context, light):
-    """Over the range that fits end in, interpolation between nodes costs less than 0.5 % relative RMSE."""
+    """Over the range that fits end in, interpolation between nodes costs less than 0.6 % relative RMSE."""
     captured = Runtime(colored_room(), "default", context=gl_context).capture(room_view(light))
     receivers, vpls = gather_inputs(captured)
     binned = bin_vpls(receivers, vpls)
@@ -90,7 +90,7 @@ def test_binned_gather_is_close(gl_context, light):
         for kappa in (0.0, 0.5, 2.0):
             parameters = FalloffParameters(*map(jnp.float32, (1.7, alpha, kappa)))
             exact = np.asarray(gather(receivers, vpls, parameters))
-            assert relative_rms(np.asarray(gather_binned(binned, parameters)), exact) < 5e-3
+            assert relative_rms(np.asarray(gather_binned(binned, parameters)), exact) < 6e-3
 
 
 def test_hidden_vpls_give_nothing(gl_context):

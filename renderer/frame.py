@@ -128,6 +128,10 @@ class Frame:
         """From radiance to the display picture."""
         self._tone_mapping.draw(self.radiance, exposure, self.display)
 
+    def read_exposure(self) -> float:
+        """The exposure of the display picture: waits for the GPU."""
+        return self._tone_mapping.read_exposure()
+
     def camera(self, view: View) -> CameraUniforms:
         """The view's camera as the shaders know it."""
         return camera_uniforms(view.camera, self.size, self._scene.bounds())

@@ -10,6 +10,7 @@ from typing import Any, Literal, get_args
 import moderngl
 import numpy as np
 
+from renderer.animation import Pose
 from renderer.artist_parameters import ArtistParameters
 from renderer.capture import CapturedFrame, capture_frame, read_picture
 from renderer.dynamic_lights import DynamicLights
@@ -147,6 +148,23 @@ class Runtime:
         frame.radiance.write(np.ascontiguousarray(pixels[::-1]).tobytes())
         frame.tone_map(exposure)
         return np.ascontiguousarray(read_picture(frame.display)[..., :3])
+
+    @_on_own_context
+    def exposure(self) -> float:
+        """What multiplied radiance in the last picture for display: for the next ones of a sequence.
+
+        Raises:
+            ValueError: there was none yet.
+        """
+        if not self._frames:
+            raise ValueError("exposure: no picture has been drawn yet")
+        (frame,) = self._frames.values()
+        return frame.read_exposure()
+
+    @_on_own_context
+    def pose(self, pose: Pose) -> None:
+        """Move the scene; takes effect with the next picture."""
+        self.scene_buffers.set_pose(pose.transforms, pose.joint_matrices)
 
     @_on_own_context
     def capture(

@@ -35,3 +35,7 @@ class ToneMappingPass:
         display.bind_to_image(0, read=False, write=True)
         self._program.run(-(-display.width // 8), -(-display.height // 8))
         context.memory_barrier(context.TEXTURE_FETCH_BARRIER_BIT)
+
+    def read_exposure(self) -> float:
+        """What radiance was multiplied by last: waits for the GPU."""
+        return float(np.frombuffer(self._exposure.read(4), np.float32)[0])

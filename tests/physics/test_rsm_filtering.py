@@ -36,7 +36,7 @@ def test_filtering_keeps_energy(gl_context, light, density_exponent):
             expected = captured
         np.testing.assert_allclose(captured.vpl_flux.mean(), expected.vpl_flux.mean(), rtol=1e-2)
         np.testing.assert_allclose(captured.scene_length, expected.scene_length, rtol=1e-4)
-        if density_exponent == 0.0:  # else area over chance runs away where a cone's rim gives next to no flux
+        if density_exponent == 0.0:  # else area over chance runs away at a cone's rim
             area, expected_area = (np.sum(c.vpl_footprint**2, dtype=np.float64) for c in (captured, expected))
             np.testing.assert_allclose(area, expected_area, rtol=3e-2)
 

@@ -18,6 +18,7 @@ LARGEST_SIDE = 16384
 LARGEST_VIEW_COUNT = 64
 
 Layer = Literal["final", "direct", "indirect", "irradiance", "albedo", "normal", "depth"]
+Motion = Literal["auto", "none", "light", "camera", "both"]
 Bounces = Literal["1", "all"]
 
 SceneArgument = Annotated[

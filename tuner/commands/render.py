@@ -1,7 +1,8 @@
 """`vpltune render`: one picture, or one layer of it, drawn by the runtime."""
 
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,6 +18,7 @@ from tuner.commands.options import (
     LightPositionOption,
     LightTypeOption,
     LookAtOption,
+    Motion,
     SceneArgument,
     VisibilityOption,
     YfovOption,
@@ -26,7 +28,7 @@ from tuner.commands.options import (
 from tuner.commands.report import Report, warn
 
 if TYPE_CHECKING:
-    from renderer.dynamic_lights import DynamicLights
+    from renderer.light_motion import BouncingLights
     from renderer.runtime import Runtime
     from renderer.scene import Camera, Light, Scene
     from renderer.views import View
@@ -42,7 +44,10 @@ def render(
     output: Annotated[
         Path,
         typer.Option(
-            "-o", "--output", metavar="OUT", help="A .png for display, or an .exr of linear float32."
+            "-o",
+            "--output",
+            metavar="OUT",
+            help="A .png for display, or an .exr of linear float32; with --frames, an .mp4 or a folder.",
         ),
     ],
     config: Annotated[str, typer.Option(metavar="FILE", help="A tuned config, or `default`.")] = "default",
@@ -58,6 +63,13 @@ def render(
             metavar="N", min=0, max=LARGEST_DYNAMIC_LIGHT_COUNT, help="Add N small lights that fly about."
         ),
     ] = 0,
+    frames: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Draw a clip: N frames of the scene in motion.")
+    ] = None,
+    fps: Annotated[float, typer.Option(metavar="F", help="Frames per second of the clip.")] = 30.0,
+    motion: Annotated[
+        Motion, typer.Option(help="What moves besides the scene's animation; auto: both where it has none.")
+    ] = "auto",
     scale: Annotated[float, typer.Option(help="Draw scene, camera and light this much larger.")] = 1.0,
     views: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Take camera, lights and size from a views.json.")
@@ -77,6 +89,8 @@ def render(
     """Draw a scene with a config, headless."""
     from renderer.image_file import require_extension
     from renderer.tuned_config import read_config
+    from renderer.video_file import check_clip_path
+    from tuner.commands.render_clip import write_clip
     from tuner.commands.view_flags import ViewFlags, camera_from_flags, light_from_flags
 
     flags = ViewFlags(
@@ -91,8 +105,13 @@ def render(
         light_cone,
     )
     # All that can be refused is refused before the scene is read.
-    require_extension(output, ".png", ".exr")
     picture_size = None if size is None else parse_size(size)
+    if frames is None:
+        require_extension(output, ".png", ".exr")
+    else:
+        check_clip_path(output, picture_size or DEFAULT_SIZE)
+    if not (math.isfinite(fps) and 0.1 <= fps <= 1000.0):
+        raise InputError(f"--fps: must lie in [0.1, 1000], got {fps}")
     factor = checked_scale(scale)
     if interleave not in (1, 2, 4, 8):
         raise InputError(f"--interleave: must be 1, 2, 4 or 8, got {interleave}")
@@ -104,6 +123,7 @@ def render(
     from renderer.runtime_options import RuntimeOptions
     from renderer.scene import scaled
     from renderer.scene_file import read_scene
+    from renderer.sequence import Sequence
     from renderer.views import View, scaled_view
 
     loaded = read_scene(scene)
@@ -111,11 +131,17 @@ def render(
     drawn = from_file or _placed_view(loaded, scene, camera, light)
     if picture_size is not None:
         drawn = View(drawn.name, drawn.split, picture_size, drawn.camera, drawn.lights)
+    sequence = Sequence(loaded, drawn, motion, factor)
     if factor != 1.0:
         loaded, drawn = scaled(loaded, factor), scaled_view(drawn, factor)
     runtime = Runtime(loaded, tuned, RuntimeOptions(interleave=interleave))
-    _write_layer(runtime, drawn, layer, output, _dynamic_lights(loaded, drawn, dynamic_lights))
-    return _report(scene, output, layer, tuned.parameters.as_dict(), drawn)
+    bouncing = _bouncing_lights(loaded, drawn, dynamic_lights)
+    if frames is None:
+        _write_layer(runtime, drawn, layer, output, bouncing)
+    else:
+        write_clip(runtime, sequence, layer, output, frames, fps, bouncing)
+    clip = {} if frames is None else {"frames": frames, "fps": fps}
+    return _report(scene, output, layer, tuned.parameters.as_dict(), drawn, clip)
 
 
 def _view_from_file(path: Path | None, name: str | None, flags: "ViewFlags") -> "View | None":
@@ -150,21 +176,22 @@ def _placed_view(
     return View("main", "fitted", DEFAULT_SIZE, camera, lights)
 
 
-def _dynamic_lights(scene: "Scene", view: "View", count: int) -> "DynamicLights | None":
-    from renderer.dynamic_lights import DynamicLights
+def _bouncing_lights(scene: "Scene", view: "View", count: int) -> "BouncingLights | None":
     from renderer.light_motion import BouncingLights, flux_beside
 
     if not count:
         return None
-    flux = flux_beside(scene, view.lights)
-    return DynamicLights(BouncingLights(scene, count, DYNAMIC_LIGHT_SEED, flux).records)
+    return BouncingLights(scene, count, DYNAMIC_LIGHT_SEED, flux_beside(scene, view.lights))
 
 
 def _write_layer(
-    runtime: "Runtime", view: "View", layer: Layer, output: Path, lights: "DynamicLights | None"
+    runtime: "Runtime", view: "View", layer: Layer, output: Path, bouncing: "BouncingLights | None"
 ) -> None:
+    from renderer.dynamic_lights import DynamicLights
     from renderer.image_file import write_exr, write_png
+    from tuner.commands.layer_display import for_display
 
+    lights = None if bouncing is None else DynamicLights(bouncing.records)
     if output.suffix.lower() == ".exr":
         # The final picture without its tone curve is the radiance that reaches the eye.
         pixels = (
@@ -174,31 +201,12 @@ def _write_layer(
         )
         write_exr(output, pixels, "Z" if layer == "depth" else "Y")
     else:
-        write_png(output, _for_display(runtime, layer, runtime.render(view, layer, lights=lights)))
+        write_png(output, for_display(runtime, layer, runtime.render(view, layer, lights=lights)))
 
 
-def _for_display(runtime: "Runtime", layer: Layer, pixels: Any) -> Any:
-    """A layer as display-referred colours: each in the way that layer is usually looked at."""
-    import numpy as np
-
-    from renderer.srgb import srgb_from_linear
-
-    if layer in ("direct", "indirect", "irradiance"):
-        return runtime.display(pixels)
-    if layer == "albedo":
-        return srgb_from_linear(pixels)
-    if layer == "normal":
-        return 0.5 + 0.5 * pixels
-    if layer == "depth":
-        # Nearest over depth: white is nearest, black is nothing, and no unit is involved.
-        seen = pixels > 0.0
-        nearest = pixels[seen].min() if seen.any() else 1.0
-        shown = np.divide(nearest, pixels, out=np.zeros_like(pixels), where=seen)
-        return np.repeat(shown[..., None], 3, axis=2)
-    return pixels
-
-
-def _report(scene: Path, output: Path, layer: Layer, parameters: dict, view: "View") -> Report:
+def _report(
+    scene: Path, output: Path, layer: Layer, parameters: dict, view: "View", clip: dict[str, int | float]
+) -> Report:
     from rich.markup import escape
 
     from renderer.views import views_to_json
@@ -209,7 +217,9 @@ def _report(scene: Path, output: Path, layer: Layer, parameters: dict, view: "Vi
         "layer": layer,
         "parameters": parameters,
         "view": views_to_json(str(scene), (view,))["views"][0],
+        **clip,
         "status": "ok",
     }
     width, height = view.size
-    return Report(document, (f"wrote {escape(str(output))} ({layer}, {width}x{height})",))
+    length = f", {clip['frames']} frames" if clip else ""
+    return Report(document, (f"wrote {escape(str(output))} ({layer}, {width}x{height}{length})",))

@@ -161,7 +161,7 @@ ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
         name="screen_space_radius",
         symbol="ρ",
         # What is withheld falls as 1/d⁴: at 3 footprints, little is left beyond. Contacts of six scenes were
-        # nearest to the reference with 2 to 4 (tests/physics/test_screen_space_indirect.py).
+        # nearest to the reference with 2 to 4, and a corner holds all its light with 3.
         default=3.0,
         low=0.5,
         high=16.0,

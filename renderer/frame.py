@@ -25,6 +25,7 @@ from renderer.passes.vpl_gather import VplGatherPass
 from renderer.passes.vpl_visibility_maps import VplVisibilityMapsPass
 from renderer.ray_hierarchy import RayHierarchy
 from renderer.render_targets import (
+    LightAccumulation,
     create_display_target,
     create_gbuffer,
     create_irradiance_target,
@@ -72,7 +73,7 @@ class Frame:
         self.light_pre_pass = LightPrePass(context, self.gbuffer, options.light_path)
         self._reflective_shadow_map = ReflectiveShadowMapPass(context, scene)
         self.virtual_point_lights = VirtualPointLightsPass(
-            context, self.rsm, vpl_count, options.rsm_filtering
+            context, self.rsm, vpl_count, options.point_table, options.rsm_filtering
         )
         self._direct_light = DirectLightPass(context, rsm_resolution)
         self._hierarchy = hierarchy
@@ -112,7 +113,7 @@ class Frame:
             camera, self.gbuffer, self.rsm, len(view.lights), accumulated, self.direct_irradiance
         )
         self._gather(camera, parameters)
-        self.indirect_irradiance = self._with_near_field(camera, len(view.lights), parameters)
+        self.indirect_irradiance = self._with_near_field(camera, len(view.lights), accumulated, parameters)
 
     def resolve(self, share: tuple[float, float], exposure: float | None) -> None:
         """From the irradiance buffers to radiance and the display picture.
@@ -154,7 +155,11 @@ class Frame:
         self._vpl_gather.refine(camera, self.gbuffer, count, parameters, self._pixel_list, picture)
 
     def _with_near_field(
-        self, camera: CameraUniforms, light_count: int, parameters: ArtistParameters
+        self,
+        camera: CameraUniforms,
+        light_count: int,
+        accumulated: LightAccumulation | None,
+        parameters: ArtistParameters,
     ) -> moderngl.Texture:
         if parameters.screen_space_strength == 0.0:
             return self.vpl_irradiance
@@ -162,6 +167,7 @@ class Frame:
             camera,
             self.gbuffer,
             self.direct_irradiance,
+            accumulated,
             light_count,
             self.virtual_point_lights.count,
             parameters,

@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-Interleave = Literal[1, 2, 4, 8]
+from renderer.point_table import PointTable
+
+INTERLEAVES = (1, 2, 4, 8)
 LightPath = Literal["auto", "volumes", "tiles"]
 RsmFiltering = Literal[1, 2, 4, 8]
 
@@ -16,13 +18,17 @@ class RuntimeOptions:
         ValueError: a field has a value that it cannot have.
     """
 
-    interleave: Interleave = 1
-    """Pixels along the side of a block that shares the VPLs out among its pixels. 1 gathers every VPL at
-    every pixel, which is what the tuner's surrogate is a twin of; 4 is some ten times faster."""
+    interleave: int = 1
+    """One of `INTERLEAVES`: pixels along the side of a block that shares the VPLs out among its pixels. 1
+    gathers every VPL at every pixel, which is what the tuner's surrogate is a twin of; 4 is some ten times
+    faster."""
 
     light_path: LightPath = "auto"
     """How dynamic lights are drawn: as blended volumes, in tiles, or in whichever of the two is measured to
     be faster on this machine, when a frame first has that many lights."""
+
+    point_table: PointTable = "r2"
+    """From which VPLs are placed: the R2 sequence, or the study's Poisson discs, to compare with."""
 
     visibility_map_size: int = 16
     """Texels along the side of a VPL's visibility map, in [4, 64], where the config asks for maps."""
@@ -36,12 +42,14 @@ class RuntimeOptions:
     place by whole blocks of texels. Otherwise it fits the bounds, and shadows and VPLs crawl with them."""
 
     def __post_init__(self) -> None:
-        if self.interleave not in get_args(Interleave):
-            raise ValueError(f"interleave: must be one of {get_args(Interleave)}, got {self.interleave!r}")
+        if self.interleave not in INTERLEAVES:
+            raise ValueError(f"interleave: must be one of {INTERLEAVES}, got {self.interleave!r}")
         if not 4 <= self.visibility_map_size <= 64:
             raise ValueError(f"visibility_map_size: must be in [4, 64], got {self.visibility_map_size!r}")
         if self.light_path not in get_args(LightPath):
             raise ValueError(f"light_path: must be one of {get_args(LightPath)}, got {self.light_path!r}")
+        if self.point_table not in get_args(PointTable):
+            raise ValueError(f"point_table: must be one of {get_args(PointTable)}, got {self.point_table!r}")
         if self.rsm_filtering not in get_args(RsmFiltering):
             raise ValueError(
                 f"rsm_filtering: must be one of {get_args(RsmFiltering)}, got {self.rsm_filtering!r}"

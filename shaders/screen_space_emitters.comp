@@ -15,6 +15,8 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 uniform sampler2D gbuffer_albedo;
 uniform sampler2D direct_irradiance;
+uniform sampler2D light_accumulation;  // dynamic lights have no VPLs, and so lose nothing
+uniform float accumulation_unit;       // irradiance [W/m²] of a stored 1; 0 where there is none
 uniform int vpl_count;
 uniform int light_count;
 uniform float density_exponent;
@@ -53,7 +55,12 @@ void main() {
     if (any(greaterThanEqual(pixel, imageSize(out_emitters)))) {
         return;
     }
-    vec3 radiosity = texelFetch(gbuffer_albedo, pixel, 0).rgb * texelFetch(direct_irradiance, pixel, 0).rgb;
+    vec3 irradiance = texelFetch(direct_irradiance, pixel, 0).rgb;
+    if (accumulation_unit > 0.0) {
+        vec3 dynamic = accumulation_unit * min(texelFetch(light_accumulation, pixel, 0).rgb, 65504.0);
+        irradiance = max(irradiance - dynamic, 0.0);
+    }
+    vec3 radiosity = texelFetch(gbuffer_albedo, pixel, 0).rgb * irradiance;
     float level = mean_flux(radiosity);
     float area = 0.0;
     if (level > 0.0) {

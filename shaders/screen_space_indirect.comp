@@ -5,11 +5,11 @@
 //     1/d² - 1/(d² + (αl)²) = 1/d² · (1 - d²/(d² + (αl)²)),
 // intensity k and transmittance T(d) alike. It falls as 1/d⁴, so that the visible surroundings hold nearly all
 // of it; Nichols and Wyman (2010) and Novák et al. (2011) restore bounded VPL light the same way.
-// A pixel stands for the area a·z²/(n·v) of its surface, a its area at unit depth, v the ray of unit depth.
 //
 // Samples lie evenly in angle and in the logarithm of the radius, for the integrand falls as 1/r² in a corner.
 // The pixels of a 4×4 block take different runs of one R2 sequence; the interleaved filter puts them together.
 #include "common/gbuffer.glsl"
+#include "common/pixel_area.glsl"
 #include "common/scene_length.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -42,14 +42,7 @@ vec3 near_field(Receiver receiver, ivec2 at) {
     float cosine_receiver = max(dot(receiver.normal_world, to_emitter), 0.0);
     float cosine_emitter = max(-dot(surface.normal_world, to_emitter), 0.0);
 
-    vec2 size = vec2(textureSize(emitters, 0));
-    vec3 from_eye = surface.position_world - camera_to_world[3].xyz;
-    float view_depth = -dot(camera_to_world[2].xyz, from_eye);
-    vec3 ray = from_eye / view_depth;
-    float cosine_eye = max(-dot(surface.normal_world, ray), MIN_EYE_COSINE * length(ray));
-    vec2 side = 2.0 * view_depth * tan_half_fov / size;
-    float area = side.x * side.y / cosine_eye;
-
+    float area = pixel_area(surface, textureSize(emitters, 0));
     float softening = falloff_footprint * falloff_footprint * emitter.a;
     float lost = softening / (distance_squared + softening);
     // The pixel itself is a disc, not a point: with its area, no neighbour gives more than its form factor.

@@ -6,7 +6,7 @@ from renderer import buffer_bindings
 from renderer.artist_parameters import ArtistParameters
 from renderer.camera_uniforms import CameraUniforms
 from renderer.point_table import R2_STEPS
-from renderer.render_targets import GBuffer, create_irradiance_target
+from renderer.render_targets import GBuffer, LightAccumulation, create_irradiance_target
 from renderer.shader_library import load_compute, set_uniforms
 
 BLOCK = 4
@@ -15,8 +15,6 @@ SAMPLES = 16
 """Of each pixel: 256 within a block."""
 NEAREST_PIXEL = 0.7
 """Where sampling starts, in pixels: nearer, a pixel would mostly find itself, which gives it nothing."""
-MIN_EYE_COSINE = 0.02
-"""Bounds the area that a pixel stands for at grazing sight: 50 times its own."""
 
 
 class ScreenSpaceIndirectPass:
@@ -35,7 +33,6 @@ class ScreenSpaceIndirectPass:
                 "BLOCK": BLOCK,
                 "SAMPLES": SAMPLES,
                 "NEAREST_PIXEL": NEAREST_PIXEL,
-                "MIN_EYE_COSINE": MIN_EYE_COSINE,
                 "R2_STEP_X": R2_STEPS[0],
                 "R2_STEP_Y": R2_STEPS[1],
             },
@@ -48,12 +45,13 @@ class ScreenSpaceIndirectPass:
         camera: CameraUniforms,
         gbuffer: GBuffer,
         direct_irradiance: moderngl.Texture,
+        accumulated: LightAccumulation | None,
         light_count: int,
         vpl_count: int,
         parameters: ArtistParameters,
         interleaved_irradiance: moderngl.Texture,
     ) -> None:
-        """Gather for the lights, faces and VPLs that are bound."""
+        """Gather for the lights, faces and VPLs that are bound; `accumulated` light has no VPLs: left out."""
         context = self._context
         groups = (-(-interleaved_irradiance.width // 8), -(-interleaved_irradiance.height // 8))
         self._footprint.bind_to_storage_buffer(buffer_bindings.VPL_FOOTPRINT)
@@ -63,10 +61,14 @@ class ScreenSpaceIndirectPass:
         camera.bind_gbuffer(self._emitters, gbuffer, 0)
         gbuffer.albedo.use(2)
         direct_irradiance.use(3)
+        if accumulated is not None:
+            accumulated.texture.use(4)
         set_uniforms(
             self._emitters,
             gbuffer_albedo=2,
             direct_irradiance=3,
+            light_accumulation=4,
+            accumulation_unit=0.0 if accumulated is None else accumulated.unit,
             vpl_count=vpl_count,
             light_count=light_count,
             density_exponent=parameters.density_exponent,

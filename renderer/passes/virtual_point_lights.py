@@ -5,7 +5,7 @@ import math
 import moderngl
 
 from renderer import buffer_bindings
-from renderer.point_table import r2_sequence
+from renderer.point_table import PointTable, point_table
 from renderer.render_targets import ReflectiveShadowMap
 from renderer.shader_library import load_compute, set_uniforms
 
@@ -23,7 +23,12 @@ class VirtualPointLightsPass:
     """
 
     def __init__(
-        self, context: moderngl.Context, rsm: ReflectiveShadowMap, count: int, rsm_filtering: int = 1
+        self,
+        context: moderngl.Context,
+        rsm: ReflectiveShadowMap,
+        count: int,
+        table: PointTable = "r2",
+        rsm_filtering: int = 1,
     ):
         self._context = context
         self.count = count
@@ -41,7 +46,7 @@ class VirtualPointLightsPass:
         self._placement = load_compute(context, "virtual_point_lights", defines)
         columns, rows = rsm.depth.width // rsm_filtering, self._rows
         self._buffers = {
-            buffer_bindings.POINT_TABLE: context.buffer(r2_sequence(count).tobytes()),
+            buffer_bindings.POINT_TABLE: context.buffer(point_table(table, count).tobytes()),
             buffer_bindings.ROW_CDF: context.buffer(reserve=rows * columns * 4),
             buffer_bindings.ROW_MOMENTS: context.buffer(reserve=rows * _ROW_MOMENTS_BYTES),
             buffer_bindings.MARGINAL_CDF: context.buffer(reserve=rows * 4),
@@ -58,7 +63,7 @@ class VirtualPointLightsPass:
     ) -> None:
         """Place the VPLs.
 
-        `density_exponent` γ: chance ∝ luminance(flux)^γ over lit texels. `table_rotation` shifts the
+        `density_exponent` γ: chance ∝ flux^γ over lit texels. `table_rotation` shifts the
         point table on its torus, in [0, 1)².
         """
         for binding, buffer in self._buffers.items():

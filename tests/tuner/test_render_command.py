@@ -69,7 +69,7 @@ def test_interleaved_pictures_are_near_the_full_one(views_path, tmp_path):
 
 def test_a_block_of_another_size_is_refused(views_path, tmp_path, capfd):
     assert render(views_path, tmp_path / "a.png", "--interleave", "3") == 2
-    assert "--interleave: must be 1, 2, 4 or 8, got 3" in capfd.readouterr().err
+    assert "--interleave: must be one of (1, 2, 4, 8), got 3" in capfd.readouterr().err
     assert not list(tmp_path.iterdir())
 
 

@@ -88,6 +88,7 @@ def render(
 ) -> Report:
     """Draw a scene with a config, headless."""
     from renderer.image_file import require_extension
+    from renderer.runtime_options import INTERLEAVES
     from renderer.tuned_config import read_config
     from renderer.video_file import check_clip_path
     from tuner.commands.render_clip import write_clip
@@ -113,8 +114,8 @@ def render(
     if not (math.isfinite(fps) and 0.1 <= fps <= 1000.0):
         raise InputError(f"--fps: must lie in [0.1, 1000], got {fps}")
     factor = checked_scale(scale)
-    if interleave not in (1, 2, 4, 8):
-        raise InputError(f"--interleave: must be 1, 2, 4 or 8, got {interleave}")
+    if interleave not in INTERLEAVES:
+        raise InputError(f"--interleave: must be one of {INTERLEAVES}, got {interleave}")
     tuned = read_config(config).seen_by(visibility)
     from_file = _view_from_file(views, view, flags)
     camera, light = camera_from_flags(flags), light_from_flags(flags)

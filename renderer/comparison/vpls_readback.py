@@ -1,7 +1,10 @@
 """VPLs as the 2010 study had them: RSM read back, a Poisson-disc pattern on the CPU, a draw per VPL."""
 
+from dataclasses import dataclass
+
 import moderngl
 import numpy as np
+from jaxtyping import Float16, Float32, UInt16
 
 from renderer import buffer_bindings
 from renderer.artist_parameters import ArtistParameters
@@ -18,6 +21,15 @@ MIN_COSINE = 0.02
 """As RSM_MIN_COSINE of shaders/common/rsm.glsl."""
 
 
+@dataclass(frozen=True, eq=False)
+class RsmTexels:
+    """An RSM atlas on the CPU, as it is stored; row 0 at the bottom."""
+
+    depth: Float32[np.ndarray, "rows columns"]
+    normal: UInt16[np.ndarray, "rows columns 2"]
+    reflectance: Float16[np.ndarray, "rows columns 4"]
+
+
 class VplsReadback:
     """RSM of a drawn frame → irradiance, with the RSM read back on the way."""
 
@@ -30,18 +42,25 @@ class VplsReadback:
         self.irradiance = create_irradiance_target(context, frame.size)
         self._framebuffer = context.framebuffer([self.irradiance])
 
-    def place(self, records: LightRecords) -> np.ndarray:
-        """Read the RSM back and take the texels under the pattern: [count] of `VPL_DTYPE`.
+    def read(self) -> RsmTexels:
+        """The whole RSM, which waits until the GPU has drawn it."""
+        rsm = self._frame.rsm
+        columns, rows = rsm.depth.size
+        return RsmTexels(
+            np.frombuffer(rsm.depth.read(), np.float32).reshape(rows, columns),
+            np.frombuffer(rsm.normal.read(), np.uint16).reshape(rows, columns, 2),
+            np.frombuffer(rsm.reflectance.read(), np.float16).reshape(rows, columns, 4),
+        )
+
+    def place(self, texels: RsmTexels, records: LightRecords) -> np.ndarray:
+        """The texels under the pattern: [count] of `VPL_DTYPE`.
 
         Uniform over texels, so each of N stands for texels/N of them. Twin: `rsm_texel` of
         shaders/common/rsm.glsl.
         """
         rsm = self._frame.rsm
         columns, rows = rsm.depth.size
-        depth = np.frombuffer(rsm.depth.read(), np.float32).reshape(rows, columns)
-        normal = np.frombuffer(rsm.normal.read(), np.uint16).reshape(rows, columns, 2)
-        reflectance = np.frombuffer(rsm.reflectance.read(), np.float16).reshape(rows, columns, 4)
-
+        depth, normal, reflectance = texels.depth, texels.normal, texels.reflectance
         column, row = (self._points * np.array([columns, rows])).astype(int).T
         tile = row // rsm.resolution * rsm.columns + column // rsm.resolution
         lit = (tile < rsm.face_count) & (depth[row, column] > 0.0)

@@ -86,7 +86,9 @@ def test_read_back_vpls_have_the_same_energy(gl_context, light):
     drawn = Drawn(gl_context, colored_room(), inside_room(light))
     expected = drawn.main_path()
     readback = VplsReadback(gl_context, drawn.frame, 2048)
-    picture = read_picture(readback.draw(drawn.view, readback.place(drawn.records), PARAMETERS))
+    picture = read_picture(
+        readback.draw(drawn.view, readback.place(readback.read(), drawn.records), PARAMETERS)
+    )
     np.testing.assert_allclose(picture[..., :3].mean(axis=(0, 1)), expected.mean(axis=(0, 1)), rtol=0.05)
 
 
@@ -97,7 +99,8 @@ def test_read_back_texels_are_the_gpus(gl_context):
     """
     drawn = Drawn(gl_context, colored_room(), inside_room("spot"))
     vpls = np.frombuffer(drawn.frame.virtual_point_lights.virtual_point_lights.read(), np.float32)
-    placed = VplsReadback(gl_context, drawn.frame, 2048).place(drawn.records)
+    readback = VplsReadback(gl_context, drawn.frame, 2048)
+    placed = readback.place(readback.read(), drawn.records)
     np.testing.assert_allclose(
         placed["flux"].sum(axis=0), vpls.reshape(-1, 12)[:, 8:11].sum(axis=0), rtol=0.02
     )

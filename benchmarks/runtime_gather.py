@@ -1,0 +1,163 @@
+"""VPL placement, gather and the whole indirect path: interleaved against full, GPU against read-back."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import moderngl
+import numpy as np
+
+import configs
+from benchmarks.row import Row
+from renderer.artist_parameters import ArtistParameters
+from renderer.capture import read_picture
+from renderer.comparison.vpls_readback import VplsReadback
+from renderer.frame import Frame, frame_light_records
+from renderer.gpu_context import create_context
+from renderer.light_faces import LightRecords
+from renderer.runtime import Runtime
+from renderer.runtime_options import RuntimeOptions
+from renderer.scene_file import read_scene
+from renderer.tuned_config import TunedConfig
+from renderer.view_placement import resolve_camera_and_lights
+from renderer.views import View
+
+SIZE = (640, 360)
+SIZE_1080P = (1920, 1080)
+VPL_COUNT = 1024
+READBACK_DRAWS = 128
+"""VPLs drawn one by one; their time is stated for `VPL_COUNT`."""
+_PARAMETERS = ArtistParameters(vpl_count=VPL_COUNT, screen_space_strength=1.0)
+TARGET_MS = 1.0
+"""The whole indirect path at 1080p with 1,024 VPLs on a data-centre GPU."""
+
+
+def gather_rows(progress: Callable[[str, float], None]) -> list[Row]:
+    """Rows of placement and gather; milliseconds of the best of a few runs."""
+    with create_context() as context:
+        return _rows(context, progress)
+
+
+def _rows(context: moderngl.Context, progress: Callable[[str, float], None]) -> list[Row]:
+    scene = _BenchmarkScene(context, "gallery")
+    progress("full gather", 0.0)
+    drawn = scene.drawn(SIZE, RuntimeOptions())
+    full = _gather_milliseconds(context, drawn, repeats=2)
+    full_picture = read_picture(drawn.frame.vpl_irradiance)
+    progress("one draw for each VPL", 0.35)
+    read, placed, one_by_one = _readback_milliseconds(context, drawn)
+    progress("VPL placement", 0.5)
+    placement = _milliseconds(context, lambda: _place(drawn), repeats=5)
+    progress("interleaved gather", 0.55)
+    drawn = scene.drawn(SIZE, RuntimeOptions(interleave=4))
+    interleaved = _gather_milliseconds(context, drawn, repeats=3)
+    error = _relative_error(read_picture(drawn.frame.vpl_irradiance), full_picture)
+    progress("indirect path at 1080p", 0.65)
+    whole = _indirect_milliseconds(context, scene.drawn(SIZE_1080P, RuntimeOptions(interleave=4)))
+    return [
+        Row("gather_interleaved_4x4", interleaved, "ms", f"gather_full; relMSE {error:.2g}", full),
+        Row("gather_full", full, "ms", f"one additive draw per VPL, from {READBACK_DRAWS}", one_by_one),
+        Row(
+            "vpls_gpu",
+            placement,
+            "ms",
+            f"vpls_readback: RSM read back {read:.3g} ms, Poisson-disc VPLs made on the CPU",
+            read + placed,
+        ),
+        Row("frame_1080p_1024vpl", whole, "ms", "target on a data-centre GPU", TARGET_MS),
+    ]
+
+
+class _BenchmarkScene:
+    """A scene of ours on the GPU, by its own camera and lights."""
+
+    def __init__(self, context: moderngl.Context, name: str):
+        path = Path(configs.__file__).parent / "scenes" / f"{name}.glb"
+        self._scene = read_scene(path)
+        self._context = context
+        self._camera, self._lights, _ = resolve_camera_and_lights(self._scene, path, None, None)
+
+    def drawn(self, size: tuple[int, int], options: RuntimeOptions) -> "_Drawn":
+        """A frame that has been drawn once, so that shaders are compiled and buffers filled."""
+        runtime = Runtime(self._scene, TunedConfig(_PARAMETERS), options, context=self._context)
+        view = View("gather", "fitted", size, self._camera, self._lights)
+        frame = runtime._draw(view)
+        self._context.finish()
+        return _Drawn(frame, view, frame_light_records(runtime.scene_buffers, view))
+
+
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """A drawn frame, what it shows, and the lights that are bound."""
+
+    frame: Frame
+    view: View
+    records: LightRecords
+
+
+def _milliseconds(context: moderngl.Context, draw: Callable[[], object], repeats: int) -> float:
+    """The best of some runs: by GPU timers, but by the wall clock on llvmpipe, where they under-report."""
+    wall_clock = "llvmpipe" in context.info["GL_RENDERER"]
+    best = np.inf
+    for _ in range(repeats):
+        if wall_clock:
+            start = time.perf_counter()
+            draw()
+            context.finish()
+            taken = 1e3 * (time.perf_counter() - start)
+        else:
+            query = context.query(time=True)
+            with query:
+                draw()
+            taken = 1e-6 * query.elapsed
+        best = min(best, taken)
+    return best
+
+
+def _gather_milliseconds(context: moderngl.Context, drawn: _Drawn, repeats: int) -> float:
+    """Gather, and where it is interleaved, filter and the listed pixels' full gather."""
+    camera = drawn.frame.camera(drawn.view)
+    return _milliseconds(context, lambda: drawn.frame._gather(camera, _PARAMETERS), repeats)
+
+
+def _place(drawn: _Drawn) -> None:
+    """From RSM to VPLs: densities, scene length and placement."""
+    frame, origin = drawn.frame, drawn.records.moment_origin
+    frame.virtual_point_lights.draw(frame.rsm, origin, _PARAMETERS.density_exponent, (0.0, 0.0))
+
+
+def _readback_milliseconds(context: moderngl.Context, drawn: _Drawn) -> tuple[float, float, float]:
+    """Reading the RSM back; making the VPLs of it; drawing them one by one. The first two wait."""
+    readback = VplsReadback(context, drawn.frame, VPL_COUNT)
+    context.finish()
+    start = time.perf_counter()
+    texels = readback.read()
+    read = time.perf_counter()
+    vpls = readback.place(texels, drawn.records)
+    placed = time.perf_counter()
+    readback.draw(drawn.view, vpls[:4], _PARAMETERS)
+    one_by_one = _milliseconds(
+        context, lambda: readback.draw(drawn.view, vpls[:READBACK_DRAWS], _PARAMETERS), repeats=1
+    )
+    return 1e3 * (read - start), 1e3 * (placed - read), one_by_one * VPL_COUNT / READBACK_DRAWS
+
+
+def _indirect_milliseconds(context: moderngl.Context, drawn: _Drawn) -> float:
+    """RSM, VPLs, gather, filter and screen-space near field: all that indirect light adds to a frame."""
+    frame, camera = drawn.frame, drawn.frame.camera(drawn.view)
+
+    def indirect_path() -> None:
+        frame._reflective_shadow_map.draw(frame.rsm)
+        _place(drawn)
+        frame._gather(camera, _PARAMETERS)
+        frame._with_near_field(camera, len(drawn.view.lights), None, _PARAMETERS)
+
+    return _milliseconds(context, indirect_path, repeats=2)
+
+
+def _relative_error(picture: np.ndarray, reference: np.ndarray) -> float:
+    """relMSE of irradiance (tuner.view_metrics) where a surface is seen."""
+    seen = reference[..., 3] > 0.0
+    y, r = picture[seen][:, :3].astype(np.float64), reference[seen][:, :3].astype(np.float64)
+    return float(np.mean((y - r) ** 2 / (r**2 + 0.01 * r.mean() ** 2)))

@@ -52,7 +52,7 @@ class Frame:
         face_count: int,
         vpl_count: int,
         options: RuntimeOptions,
-        hierarchy: RayHierarchy | None,
+        hierarchy: RayHierarchy | None = None,
     ):
         self._context = context
         self._scene = scene

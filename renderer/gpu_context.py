@@ -43,7 +43,7 @@ def create_context() -> moderngl.Context:
         raise MachineError(
             f"OpenGL {REQUIRED_VERSION} is needed, {name} offers {version}; run: vpltune doctor"
         )
-    # "auto" would free objects from whichever thread drops them; ours are collected by `context.gc()`.
+    # "auto" would free objects from whichever thread drops them; ours wait for `free_dropped`.
     context.gc_mode = "context_gc"
     clip_control = _gl_function("glClipControl", None, ctypes.c_uint, ctypes.c_uint)
     clip_control(_GL_LOWER_LEFT, _GL_ZERO_TO_ONE)
@@ -66,6 +66,17 @@ def create_depth_texture(context: moderngl.Context, size: tuple[int, int]) -> mo
     )
     check_errors(context, f"a {size[0]}x{size[1]} depth texture")
     return texture
+
+
+def free_dropped(context: moderngl.Context) -> None:
+    """Free the OpenGL objects that nothing refers to any more.
+
+    As `context.gc()`, which stops with an exception at an object that was also released by hand.
+    """
+    while context.objects:
+        dropped = context.objects.popleft()
+        if hasattr(dropped, "release"):
+            dropped.release()
 
 
 def check_errors(context: moderngl.Context, doing: str) -> None:

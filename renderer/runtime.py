@@ -15,7 +15,7 @@ from renderer.artist_parameters import ArtistParameters
 from renderer.capture import CapturedFrame, capture_frame, read_picture
 from renderer.dynamic_lights import DynamicLights
 from renderer.frame import Frame, frame_light_records
-from renderer.gpu_context import check_errors, create_context
+from renderer.gpu_context import check_errors, create_context, free_dropped
 from renderer.light_faces import face_count
 from renderer.ray_hierarchy import RayHierarchy
 from renderer.runtime_options import RuntimeOptions
@@ -203,7 +203,7 @@ class Runtime:
         if key not in self._frames:
             # One frame's targets at a time: pictures of many sizes must not add up in GPU memory.
             self._frames.clear()
-            self._context.gc()
+            free_dropped(self._context)
             resolution = self._face_resolution(face_count)
             if maps and self._hierarchy is None:
                 self._hierarchy = RayHierarchy(self._context, self._scene, self.scene_buffers)

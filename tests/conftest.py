@@ -48,3 +48,10 @@ def gl_context():
     from renderer.gpu_context import create_context
 
     return create_context()
+
+
+@pytest.fixture(autouse=True)
+def gl_context_is_current(request):
+    """Whatever context an earlier test made for itself, `gl_context` is the one that OpenGL calls reach."""
+    if "gl_context" in request.fixturenames:
+        request.getfixturevalue("gl_context").__enter__()

@@ -26,6 +26,13 @@ def test_every_layer_has_its_shape_and_values(gl_context, layer):
     assert picture.any()
 
 
+def test_an_object_released_by_hand_does_no_harm(gl_context):
+    """moderngl's own collection stops at one; making the next frame must not."""
+    gl_context.buffer(reserve=16).release()
+    for size in ((16, 12), (20, 12)):
+        Runtime(colored_room(), "default", context=gl_context).render(room_view("spot", size), "albedo")
+
+
 def test_direct_and_indirect_add_up(gl_context):
     """Radiance is linear in light: the two layers sum to the whole, to float32's rounding."""
     runtime = Runtime(colored_room(), "default", context=gl_context)

@@ -16,6 +16,10 @@ from renderer.runtime import Runtime
 from tuner.__main__ import run
 from tuner.commands.options import Motion
 
+# The encoder is started by fork and exec, of which JAX warns once an earlier test has loaded it; the command
+# itself never loads JAX.
+pytestmark = pytest.mark.filterwarnings("ignore:os.fork:RuntimeWarning")
+
 SCENE = Path(__file__).resolve().parent.parent.parent / "configs" / "scenes" / "cornell-box.glb"
 
 

@@ -22,6 +22,8 @@ class CapturedView:
     view: View
     reference: ReferenceView
     captured: CapturedFrame
+    drawn_with: ArtistParameters | None = None
+    """The parameters that `captured` was drawn with, where they are known."""
     valid: Bool[np.ndarray, "height width"] = field(init=False)
     """Where both runtime and reference see a surface: at silhouettes rasteriser and ray may differ."""
 
@@ -61,14 +63,16 @@ def capture_views(
 ) -> tuple[CapturedView, ...]:
     """Draw and read back every view."""
     return tuple(
-        CapturedView(view, reference, runtime.capture(view))
+        CapturedView(view, reference, runtime.capture(view), runtime.parameters)
         for view, reference in zip(views, references, strict=True)
     )
 
 
 def runtime_irradiance(
-    runtime: Runtime, parameters: ArtistParameters, view: View
+    runtime: Runtime, parameters: ArtistParameters, view: CapturedView
 ) -> Float32[np.ndarray, "height width 3"]:
-    """The runtime's own indirect irradiance of a view with `parameters`."""
+    """The runtime's own indirect irradiance of a view with `parameters`, drawn unless it already was."""
+    if view.drawn_with == parameters:
+        return view.captured.indirect_irradiance
     runtime.parameters = parameters
-    return runtime.render(view, "irradiance")
+    return runtime.render(view.view, "irradiance")

@@ -114,8 +114,8 @@ def _evaluate_view(
     visibility: Bool[np.ndarray, "receivers vpls"],
 ) -> EvaluatedView:
     pictures = {
-        "default": runtime_irradiance(runtime, default, view.view),
-        "tuned": runtime_irradiance(runtime, tuned, view.view),
+        "default": runtime_irradiance(runtime, default, view),
+        "tuned": runtime_irradiance(runtime, tuned, view),
         "ceiling": surrogate_irradiance(view, ceiling, visibility),
     }
     reference_radiance = view.reference_radiance()

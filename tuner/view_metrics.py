@@ -1,7 +1,12 @@
 """How far a picture is from its reference: relMSE and energy of irradiance, HDR-FLIP of radiance."""
 
+import os
 from dataclasses import dataclass
 from statistics import fmean
+
+# FLIP's threads spin while they wait for each other: on a busy machine two of them took ten times as long
+# as one for pictures of this size. Read once, when its library is loaded.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import flip_evaluator
 import numpy as np

@@ -14,6 +14,7 @@ from renderer.tuned_config import TunedConfig
 from renderer.view_placement import resolve_camera_and_lights, views_for_scene
 from renderer.views import View
 from tuner.captured_view import CapturedView, capture_views
+from tuner.compiled_functions import keep_compiled_functions
 from tuner.reference import reference_views
 
 Progress = Callable[[str, float], None]
@@ -84,6 +85,7 @@ def prepare_scene(
         InputError: the scene or its sidecar cannot be used.
         MachineError: no OpenGL.
     """
+    keep_compiled_functions()
     with watch.stage("load"):
         progress("load", 0.0)
         scene = read_scene(scene_path)

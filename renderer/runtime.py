@@ -1,7 +1,6 @@
 """The runtime: a scene and a tuned config in, pictures out."""
 
 import functools
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +14,7 @@ from renderer.artist_parameters import ArtistParameters
 from renderer.capture import CapturedFrame, capture_frame, read_picture
 from renderer.dynamic_lights import DynamicLights
 from renderer.frame import Frame, frame_light_records
+from renderer.frame_timing import FrameTiming
 from renderer.gpu_context import check_errors, create_context, free_dropped
 from renderer.light_faces import face_count
 from renderer.ray_hierarchy import RayHierarchy
@@ -150,6 +150,18 @@ class Runtime:
         return np.ascontiguousarray(read_picture(frame.display)[..., :3])
 
     @_on_own_context
+    def pass_milliseconds(
+        self, view: View, frames: int = 5, lights: DynamicLights | None = None
+    ) -> dict[str, float]:
+        """Milliseconds of each pass, the median of `frames` frames after one that is not timed."""
+        frame = self._draw(view, lights=lights)
+        with FrameTiming(self._context, frame) as timing:
+            for _ in range(frames):
+                self.draw(view, lights=lights)
+                timing.end_frame()
+        return timing.milliseconds()
+
+    @_on_own_context
     def exposure(self) -> float:
         """What multiplied radiance in the last picture for display: for the next ones of a sequence.
 
@@ -227,5 +239,4 @@ class Runtime:
     def _snapped_cells(self, view: View) -> int | None:
         if not self.options.rsm_snapping:
             return None
-        resolution = self._face_resolution(face_count(view.lights))
-        return resolution // math.gcd(resolution, self.options.rsm_filtering)
+        return self._face_resolution(face_count(view.lights))

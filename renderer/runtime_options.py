@@ -7,7 +7,7 @@ from renderer.point_table import PointTable
 
 INTERLEAVES = (1, 2, 4, 8)
 LightPath = Literal["auto", "volumes", "tiles"]
-RsmFiltering = Literal[1, 2, 4, 8]
+RsmFiltering = Literal[1, 3, 5, 9]
 
 
 @dataclass(frozen=True)
@@ -33,13 +33,13 @@ class RuntimeOptions:
     visibility_map_size: int = 16
     """Texels along the side of a VPL's visibility map, in [4, 64], where the config asks for maps."""
 
-    rsm_filtering: RsmFiltering = 4
-    """RSM texels along the side of the block whose light a VPL has. 1 takes it from one texel: colour and
-    place then change by whole texels when the light moves."""
+    rsm_filtering: RsmFiltering = 5
+    """RSM texels along the side of the square whose mean light a VPL has, while it slides over its surface as
+    the light moves. 1 takes one texel's light and place, which then change by jumps."""
 
     rsm_snapping: bool = True
     """Whether a directional light's RSM keeps its grid while bounds move: its size changes in steps, its
-    place by whole blocks of texels. Otherwise it fits the bounds, and shadows and VPLs crawl with them."""
+    place by whole texels. Otherwise it fits the bounds, and shadows and VPLs crawl with them."""
 
     def __post_init__(self) -> None:
         if self.interleave not in INTERLEAVES:

@@ -1,5 +1,5 @@
-// VPLs: points of the table warped to the density over blocks of RSM texels, by inverting first the marginal
-// over rows, then the conditional along the row. No value leaves the GPU.
+// VPLs: points of the table warped to the density over RSM texels, by inverting first the marginal over
+// rows, then the conditional along the row. No value leaves the GPU.
 #include "common/rsm.glsl"
 #include "common/scene_length.glsl"
 #include "common/point_table.glsl"
@@ -47,43 +47,40 @@ int column_above(int row, int columns, float target) {
     return low;
 }
 
-// A block of RSM texels as a VPL that has all of its light. What the inversion leaves over of the table's point,
-// `within` in [0, 1)², picks the place: as light or density shift, a VPL slides, where a choice among texels
-// would jump.
-VirtualPointLight block_vpl(ivec2 block, vec2 within) {
-    vec2 place = within * RSM_FILTERING;
+// A VPL at a texel, with flux and area of the RSM_FILTERING² texels around it, of its face, in the mean: so that
+// it has the colour of its surroundings, not that of a speckle which the light's next move replaces. Weighted by
+// the chance of each, sum(flux) / sum(weight) keeps the energy: among texels of one chance it is the plain mean.
+VirtualPointLight texel_vpl(ivec2 texel, vec2 within) {
+    const int reach = RSM_FILTERING / 2;
+    ivec2 tile_low = texel / RSM_RESOLUTION * RSM_RESOLUTION;
+    ivec2 low = max(texel - reach, tile_low);
+    ivec2 high = min(texel + reach, tile_low + RSM_RESOLUTION - 1);
     float weight = 0.0;
     float area = 0.0;
     vec3 flux = vec3(0.0);
-    RsmTexel surface;
-    ivec2 nearest;
-    float nearest_distance = RSM_FILTERING * RSM_FILTERING * 2.0;
-    for (int i = 0; i < RSM_FILTERING * RSM_FILTERING; ++i) {
-        ivec2 at = ivec2(i % RSM_FILTERING, i / RSM_FILTERING);
-        RsmTexel texel = rsm_texel(block * RSM_FILTERING + at);
-        float texel_flux = mean_flux(texel.flux);
-        if (texel_flux > 0.0) {
-            weight += pow(texel_flux, density_exponent);
-            area += texel.area;
-            flux += texel.flux;
-            float distance_to_place = distance(vec2(at) + 0.5, place);
-            if (distance_to_place < nearest_distance) {
-                nearest_distance = distance_to_place;
-                nearest = at;
-                surface = texel;
+    for (int y = low.y; y <= high.y; ++y) {
+        for (int x = low.x; x <= high.x; ++x) {
+            RsmTexel near = rsm_texel(ivec2(x, y));
+            float near_flux = mean_flux(near.flux);
+            if (near_flux > 0.0) {
+                weight += pow(near_flux, density_exponent);
+                area += near.area;
+                flux += near.flux;
             }
         }
     }
     if (!(weight > 0.0)) {
         return NO_VPL;
     }
-#if RSM_FILTERING > 1
-    place = clamp(place, vec2(nearest), vec2(nearest) + 1.0);
-    surface.position_world = rsm_position_on_plane(surface, vec2(block * RSM_FILTERING) + place);
-#endif
-    // N · p, with p = weight / total_weight the chance of this block in one draw.
+    // N · p, with p = weight / total_weight the chance of all these texels in one draw.
     float draws = float(vpl_count) * weight / total_weight;
     area /= draws;
+    RsmTexel surface = rsm_texel(texel);
+#if RSM_FILTERING > 1
+    // What the inversion leaves over of the table's point is the place in the texel: as light or density shift,
+    // a VPL slides where it would jump from centre to centre.
+    surface.position_world = rsm_position_on_plane(surface, vec2(texel) + within);
+#endif
     return VirtualPointLight(
         vec4(surface.position_world, sqrt(area / PI)), vec4(surface.normal_world, area), vec4(flux / draws, 0.0));
 }
@@ -95,7 +92,7 @@ void main() {
     }
     VirtualPointLight vpl = NO_VPL;
     if (total_weight > 0.0) {
-        int columns = rsm_columns * (RSM_RESOLUTION / RSM_FILTERING);
+        int columns = rsm_columns * RSM_RESOLUTION;
         vec2 target = fract(point_table[index] + table_rotation);
         target.y *= total_weight;
         int row = row_above(target.y);
@@ -104,9 +101,9 @@ void main() {
         int column = column_above(row, columns, target.x);
         vec2 low = vec2(column > 0 ? row_cdf[row_start + column - 1] : 0.0, row > 0 ? marginal_cdf[row - 1] : 0.0);
         vec2 high = vec2(row_cdf[row_start + column], marginal_cdf[row]);
-        // The maximum only guards the quotient: a block of no weight is never found.
+        // The maximum only guards the quotient: a texel of no weight is never found.
         vec2 within = clamp((target - low) / max(high - low, vec2(1e-30)), 0.0, 1.0);
-        vpl = block_vpl(ivec2(column, row), within);
+        vpl = texel_vpl(ivec2(column, row), within);
     }
     virtual_point_lights[index] = vpl;
 }

@@ -1,5 +1,5 @@
-// VPL density, part 1: for each row of blocks of RSM_FILTERING² texels of the RSM atlas, the running sum of
-// the sampling weights and the moments of the flux. One workgroup per row.
+// VPL density, part 1: for each row of the RSM atlas, the running sum of the sampling weights and the
+// moments of the flux. One workgroup per row.
 #include "common/rsm.glsl"
 
 layout(local_size_x = ROW_GROUP_SIZE) in;
@@ -27,7 +27,7 @@ shared vec4 sums_rest[ROW_GROUP_SIZE];
 void main() {
     int row = int(gl_WorkGroupID.x);
     int lane = int(gl_LocalInvocationID.x);
-    int columns = rsm_columns * (RSM_RESOLUTION / RSM_FILTERING);
+    int columns = rsm_columns * RSM_RESOLUTION;
     vec4 flux_position = vec4(0.0);
     vec4 rest = vec4(0.0);
     float carry = 0.0;
@@ -35,17 +35,13 @@ void main() {
         int column = start + lane;
         float weight = 0.0;
         if (column < columns) {
-            ivec2 corner = ivec2(column, row) * RSM_FILTERING;
-            for (int i = 0; i < RSM_FILTERING * RSM_FILTERING; ++i) {
-                RsmTexel texel = rsm_texel(corner + ivec2(i % RSM_FILTERING, i / RSM_FILTERING));
-                float flux = mean_flux(texel.flux);
-                if (flux > 0.0) {
-                    float texel_weight = pow(flux, density_exponent);
-                    vec3 offset = texel.position_world - moment_origin;
-                    weight += texel_weight;
-                    flux_position += flux * vec4(offset, 1.0);
-                    rest += vec4(flux * dot(offset, offset), texel_weight, 1.0, 0.0);
-                }
+            RsmTexel texel = rsm_texel(ivec2(column, row));
+            float flux = mean_flux(texel.flux);
+            if (flux > 0.0) {
+                weight = pow(flux, density_exponent);
+                vec3 offset = texel.position_world - moment_origin;
+                flux_position += flux * vec4(offset, 1.0);
+                rest += vec4(flux * dot(offset, offset), weight, 1.0, 0.0);
             }
         }
         // Inclusive scan of Hillis and Steele (1986): the order of additions is fixed, so frames repeat bitwise.

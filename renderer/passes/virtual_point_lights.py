@@ -1,7 +1,5 @@
 """Virtual point lights drawn from the RSM on the GPU: density over texels, then a warped point table."""
 
-import math
-
 import moderngl
 
 from renderer import buffer_bindings
@@ -18,8 +16,7 @@ _ROW_MOMENTS_BYTES = 32
 class VirtualPointLightsPass:
     """RSM atlas → `count` VPLs and the frame's statistics (total flux, scene length L).
 
-    VPLs are drawn among blocks of `rsm_filtering`² texels, and each has the flux and the area of all of its
-    block: a footprint-filtered fetch. At 1 a VPL is one texel.
+    Each has flux and area of the `rsm_filtering`² texels around its own, in the mean; an odd number.
     """
 
     def __init__(
@@ -32,9 +29,6 @@ class VirtualPointLightsPass:
     ):
         self._context = context
         self.count = count
-        # Blocks must not reach across tiles.
-        rsm_filtering = math.gcd(rsm_filtering, rsm.resolution)
-        self._rows = rsm.rows // rsm_filtering
         defines = {
             **buffer_bindings.DEFINES,
             "RSM_RESOLUTION": rsm.resolution,
@@ -44,7 +38,7 @@ class VirtualPointLightsPass:
         self._row_density = load_compute(context, "vpl_row_density", defines)
         self._marginal_density = load_compute(context, "vpl_marginal_density", defines)
         self._placement = load_compute(context, "virtual_point_lights", defines)
-        columns, rows = rsm.depth.width // rsm_filtering, self._rows
+        columns, rows = rsm.depth.width, rsm.rows
         self._buffers = {
             buffer_bindings.POINT_TABLE: context.buffer(point_table(table, count).tobytes()),
             buffer_bindings.ROW_CDF: context.buffer(reserve=rows * columns * 4),
@@ -72,16 +66,16 @@ class VirtualPointLightsPass:
         context = self._context
         rsm.bind(self._row_density, 0)
         set_uniforms(self._row_density, density_exponent=density_exponent, moment_origin=moment_origin)
-        self._row_density.run(self._rows)
+        self._row_density.run(rsm.rows)
         context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT)
-        set_uniforms(self._marginal_density, rows=self._rows)
+        set_uniforms(self._marginal_density, rows=rsm.rows)
         self._marginal_density.run(1)
         context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT)
         rsm.bind(self._placement, 0)
         set_uniforms(
             self._placement,
             vpl_count=self.count,
-            rows=self._rows,
+            rows=rsm.rows,
             density_exponent=density_exponent,
             table_rotation=table_rotation,
         )

@@ -5,11 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
+from moving_scenes import bent_board
 
 from renderer.animation import AnimationPlayer
 from renderer.runtime import Runtime
-from renderer.scene import Camera, Instance, Mesh, Scene, look_at
-from renderer.scene_animation import Animation, Channel, Skin, Skinning
+from renderer.scene import Camera, Instance, Mesh, look_at
 from renderer.scene_file import read_scene
 from renderer.views import View
 
@@ -43,40 +43,6 @@ def test_set_pose_is_a_scene_built_there(gl_context):
     moved = runtime.capture(room_view())
     compare(moved, Runtime(built, context=gl_context).capture(room_view()))
     assert np.abs(moved.indirect_irradiance - at_rest.indirect_irradiance).max() > 1e-2
-
-
-def bent_board(seconds_per_turn=4.0) -> Scene:
-    """The room with its board on two joints, one of which turns about z; both pull on every vertex."""
-    room = colored_room()
-    (board_index,) = [i for i, mesh in enumerate(room.meshes) if mesh.name == "board"]
-    board = room.meshes[board_index]
-    weights = np.array([[1.0, 0.0], [0.25, 0.75], [0.0, 1.0], [0.6, 0.4]], np.float32)
-    skinning = Skinning(
-        board.positions, board.normals, np.tile(np.array([[0, 1]], np.int32), (4, 1)), weights
-    )
-    times = np.linspace(0.0, seconds_per_turn, 9)
-    halves = np.linspace(0.0, np.pi, 9)
-    keys = np.stack([0 * halves, 0 * halves, np.sin(halves), np.cos(halves)], axis=1)
-    count = len(room.instances)
-    is_board = np.arange(count) == board_index
-    animation = Animation(
-        parents=np.array([-1, 0], np.int32),
-        rest_local=np.tile(np.eye(4), (2, 1, 1)),
-        rest_translation=np.zeros((2, 3)),
-        rest_rotation=np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)),
-        rest_scale=np.ones((2, 3)),
-        channels=(Channel(1, "rotation", "linear", times, keys, None, seconds_per_turn),),
-        instance_nodes=np.full(count, -1, np.int32),
-        instance_local=np.tile(np.eye(4), (count, 1, 1)),
-        instance_skins=np.where(is_board, 0, -1).astype(np.int32),
-        light_nodes=np.zeros(0, np.int32),
-        camera_nodes=np.zeros(0, np.int32),
-        skins=(Skin(np.array([0, 1], np.int32), np.tile(np.eye(4), (2, 1, 1))),),
-        root_to_world=np.eye(4),
-    )
-    meshes = list(room.meshes)
-    meshes[board_index] = dataclasses.replace(board, skinning=skinning)
-    return dataclasses.replace(room, meshes=tuple(meshes), animation=animation)
 
 
 def blended_mesh(mesh: Mesh, joint_matrices) -> Mesh:

@@ -53,3 +53,35 @@ def test_bench_prints_the_rows(capfd, monkeypatch, names):
     assert shown.err == "vpltune: boil\n"
     assert run(["bench", "boil"]) == 0
     assert "boil_s" in capfd.readouterr().out
+
+
+def test_passes_are_rows_that_add_up(monkeypatch):
+    """Each pass of a frame is a row; their ratios to the whole sum to 1, to float rounding."""
+    import benchmarks.runtime_passes as passes
+
+    monkeypatch.setattr(passes, "SIZE", (64, 48))
+    monkeypatch.setattr(passes, "LIGHT_COUNT", 20)
+    rows = passes.pass_rows(lambda stage, share: None)
+    names = [row.name for row in rows]
+    assert names[0] == "pass_geometry"
+    assert names[-1] == "pass_tone_mapping"
+    assert {"pass_reflective_shadow_map", "pass_vpl_gather", "pass_light_pre_pass"} < set(names)
+    assert sum(row.ratio for row in rows) == pytest.approx(1.0)
+
+
+def test_steadier_than_without(monkeypatch):
+    """A short run of the motion benchmark: the snapped sun is at least ten times as steady."""
+    import benchmarks.motion as motion
+
+    for name, value in {"SIZE": (32, 24), "FRAMES": 8, "VPL_COUNT": 64, "RSM_RESOLUTION": 128}.items():
+        monkeypatch.setattr(motion, name, value)
+    monkeypatch.setattr(motion, "REFERENCE_FRAMES", 2)
+    rows = {row.name: row for row in motion.rows(lambda stage, share: None)}
+    assert set(rows) == {
+        "motion_spot_filtering",
+        "motion_sun_snapping",
+        "motion_sun_filtering",
+        "motion_sun_both",
+    }
+    assert rows["motion_sun_snapping"].value < 0.1 * rows["motion_sun_snapping"].against_value
+    assert rows["motion_sun_both"].value < 0.1 * rows["motion_sun_both"].against_value

@@ -51,6 +51,10 @@ int column_above(int row, int columns, float target) {
 // it has the colour of its surroundings, not that of a speckle which the light's next move replaces. Weighted by
 // the chance of each, sum(flux) / sum(weight) keeps the energy: among texels of one chance it is the plain mean.
 VirtualPointLight texel_vpl(ivec2 texel, vec2 within) {
+    RsmTexel surface = rsm_texel(texel);
+    if (!(mean_flux(surface.flux) > 0.0)) {
+        return NO_VPL; // rounding of the sums may find a dark texel beside a lit one
+    }
     const int reach = RSM_FILTERING / 2;
     ivec2 tile_low = texel / RSM_RESOLUTION * RSM_RESOLUTION;
     ivec2 low = max(texel - reach, tile_low);
@@ -69,13 +73,9 @@ VirtualPointLight texel_vpl(ivec2 texel, vec2 within) {
             }
         }
     }
-    if (!(weight > 0.0)) {
-        return NO_VPL;
-    }
     // N · p, with p = weight / total_weight the chance of all these texels in one draw.
     float draws = float(vpl_count) * weight / total_weight;
     area /= draws;
-    RsmTexel surface = rsm_texel(texel);
 #if RSM_FILTERING > 1
     // What the inversion leaves over of the table's point is the place in the texel: as light or density shift,
     // a VPL slides where it would jump from centre to centre.
@@ -101,7 +101,7 @@ void main() {
         int column = column_above(row, columns, target.x);
         vec2 low = vec2(column > 0 ? row_cdf[row_start + column - 1] : 0.0, row > 0 ? marginal_cdf[row - 1] : 0.0);
         vec2 high = vec2(row_cdf[row_start + column], marginal_cdf[row]);
-        // The maximum only guards the quotient: a texel of no weight is never found.
+        // The maximum guards the quotient where rounding finds a texel of no weight.
         vec2 within = clamp((target - low) / max(high - low, vec2(1e-30)), 0.0, 1.0);
         vpl = texel_vpl(ivec2(column, row), within);
     }

@@ -12,12 +12,12 @@ import numpy as np
 import configs
 from benchmarks.row import Row
 from renderer.artist_parameters import ArtistParameters
+from renderer.comparison.light_per_draw import LightPerDrawPass
 from renderer.dynamic_lights import DynamicLightBuffer, DynamicLights
 from renderer.frame import Frame, frame_light_records
 from renderer.gpu_context import create_context
 from renderer.light_motion import BouncingLights, flux_beside
 from renderer.light_pre_pass import LightPrePass
-from renderer.passes.light_per_draw import LightPerDrawPass
 from renderer.runtime import Runtime
 from renderer.runtime_options import RuntimeOptions
 from renderer.scene import Scene

@@ -4,7 +4,7 @@
 
 layout(local_size_x = ROW_GROUP_SIZE) in;
 
-layout(std430, binding = ROW_CDF_BINDING) writeonly buffer RowCdf {
+layout(std430, binding = ROW_CDF_BINDING) buffer RowCdf {
     float row_cdf[];  // [rows, columns], inclusive, not normalised
 };
 
@@ -30,34 +30,36 @@ void main() {
     int columns = rsm_columns * RSM_RESOLUTION;
     vec4 flux_position = vec4(0.0);
     vec4 rest = vec4(0.0);
-    float carry = 0.0;
-    for (int start = 0; start < columns; start += ROW_GROUP_SIZE) {
-        int column = start + lane;
-        float weight = 0.0;
-        if (column < columns) {
-            RsmTexel texel = rsm_texel(ivec2(column, row));
-            float flux = mean_flux(texel.flux);
-            if (flux > 0.0) {
-                weight = pow(flux, density_exponent);
-                vec3 offset = texel.position_world - moment_origin;
-                flux_position += flux * vec4(offset, 1.0);
-                rest += vec4(flux * dot(offset, offset), weight, 1.0, 0.0);
-            }
+    // Each invocation sums a run of its own, and one scan over the runs' totals says where each begins: barriers
+    // are few, which counts where invocations of a group take turns.
+    int run = (columns + ROW_GROUP_SIZE - 1) / ROW_GROUP_SIZE;
+    int begin = min(lane * run, columns);
+    int end = min(begin + run, columns);
+    float total = 0.0;
+    for (int column = begin; column < end; ++column) {
+        RsmTexel texel = rsm_texel(ivec2(column, row));
+        float flux = mean_flux(texel.flux);
+        if (flux > 0.0) {
+            float weight = pow(flux, density_exponent);
+            total += weight;
+            vec3 offset = texel.position_world - moment_origin;
+            flux_position += flux * vec4(offset, 1.0);
+            rest += vec4(flux * dot(offset, offset), weight, 1.0, 0.0);
         }
-        // Inclusive scan of Hillis and Steele (1986): the order of additions is fixed, so frames repeat bitwise.
-        scan[lane] = weight;
+        row_cdf[row * columns + column] = total;
+    }
+    // Inclusive scan of Hillis and Steele (1986): the order of additions is fixed, so frames repeat bitwise.
+    scan[lane] = total;
+    barrier();
+    for (int reach = 1; reach < ROW_GROUP_SIZE; reach *= 2) {
+        float other = lane >= reach ? scan[lane - reach] : 0.0;
         barrier();
-        for (int reach = 1; reach < ROW_GROUP_SIZE; reach *= 2) {
-            float other = lane >= reach ? scan[lane - reach] : 0.0;
-            barrier();
-            scan[lane] += other;
-            barrier();
-        }
-        if (column < columns) {
-            row_cdf[row * columns + column] = carry + scan[lane];
-        }
-        carry += scan[ROW_GROUP_SIZE - 1];
+        scan[lane] += other;
         barrier();
+    }
+    float before = lane > 0 ? scan[lane - 1] : 0.0;
+    for (int column = begin; column < end; ++column) {
+        row_cdf[row * columns + column] += before;
     }
     sums_flux_position[lane] = flux_position;
     sums_rest[lane] = rest;
@@ -70,8 +72,6 @@ void main() {
         barrier();
     }
     if (lane == 0) {
-        // The scan's last entry, not the tree's sum: binary search must meet the very same total.
-        sums_rest[0].y = carry;
         row_moments[row] = RowMoments(sums_flux_position[0], sums_rest[0]);
     }
 }

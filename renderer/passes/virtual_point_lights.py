@@ -7,7 +7,7 @@ from renderer.point_table import PointTable, point_table
 from renderer.render_targets import ReflectiveShadowMap
 from renderer.shader_library import load_compute, set_uniforms
 
-ROW_GROUP_SIZE = 256
+ROW_GROUP_SIZE = 64
 VPL_BYTES = 48
 FRAME_STATISTICS_BYTES = 16
 _ROW_MOMENTS_BYTES = 32

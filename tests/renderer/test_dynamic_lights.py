@@ -6,6 +6,7 @@ import pytest
 from built_scenes import colored_room, quad, room_view, scene_of
 
 from renderer.capture import read_picture
+from renderer.comparison.light_per_draw import LightPerDrawPass
 from renderer.dynamic_lights import (
     DYNAMIC_LIGHT_DTYPE,
     MIN_DISTANCE,
@@ -15,7 +16,6 @@ from renderer.dynamic_lights import (
     scaled_records,
     spot_lights,
 )
-from renderer.passes.light_per_draw import LightPerDrawPass
 from renderer.passes.light_volumes import CONE_DEFINES, LightVolumesPass, cone_proxy, sphere_proxy
 from renderer.passes.tiled_lights import TILE_BATCH, TiledLightsPass
 from renderer.runtime import Runtime

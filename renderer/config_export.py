@@ -1,24 +1,39 @@
-"""A tuned config as another program takes it: normalised JSON, or constants for a shader."""
+"""A tuned config as another program takes it: JSON, constants for a shader, a C header, bytes of a block."""
 
-from typing import Literal
+from collections.abc import Callable
+from typing import Literal, get_args
 
-from renderer.artist_parameters import ARTIST_PARAMETERS, ParameterSpec
-from renderer.tuned_config import TunedConfig, config_text
+from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters, ParameterSpec
+from renderer.parameter_block import BLOCK_BYTES, BLOCK_FIELDS, pack_parameters
+from renderer.tuned_config import VISIBILITIES, TunedConfig, config_text
 
-ExportFormat = Literal["json", "glsl"]
+ExportFormat = Literal["json", "glsl", "c", "std140"]
+EXPORT_FORMATS: tuple[ExportFormat, ...] = get_args(ExportFormat)
+
+_VISIBILITY_CODES = ", ".join(f"{code} {name}" for code, name in enumerate(VISIBILITIES))
 
 
-def exported(config: TunedConfig, export_format: ExportFormat) -> str:
-    """The text of the export.
+def exported(config: TunedConfig, export_format: ExportFormat) -> bytes:
+    """The contents of the exported file.
 
     Raises:
         InputError: a value is out of range.
     """
-    return config_text(config) if export_format == "json" else glsl_constants(config)
+    if export_format == "std140":
+        return pack_parameters(config.parameters)
+    texts: dict[ExportFormat, Callable[[TunedConfig], str]] = {
+        "json": config_text,
+        "glsl": glsl_constants,
+        "c": c_header,
+    }
+    return texts[export_format](config).encode("ascii")
 
 
 def glsl_constants(config: TunedConfig) -> str:
     """Constant declarations, valid in GLSL 3.30 and later and in GLSL ES 3.00.
+
+    Where VPL_PARAMETER_BLOCK is defined, the same names are members of a uniform block, which the bytes of
+    `--to std140` fill: a shader is written once, and tuned live or compiled with its numbers.
 
     ASCII only, because GLSL before 4.20 allows nothing else even in comments; so names stand there,
     and symbols do not.
@@ -26,21 +41,77 @@ def glsl_constants(config: TunedConfig) -> str:
     Raises:
         InputError: a value is out of range.
     """
-    checked = {
-        spec.name: spec.checked(value)
-        for spec, value in zip(ARTIST_PARAMETERS, config.parameters.as_dict().values(), strict=True)
-    }
-    lines = ["// Written by `vpltune export --to glsl`. No value has a world unit."]
-    lines += [_declaration(spec, checked[spec.name]) for spec in ARTIST_PARAMETERS]
+    values = _checked(config)
+    lines = [
+        "// Written by `vpltune export --to glsl`. No value has a world unit.",
+        "#ifdef VPL_PARAMETER_BLOCK",
+    ]
+    lines += ["layout(std140) uniform VplParameters {"]
+    lines += [f"    {_glsl_type(spec)} {constant_name(spec)};  // {spec.unit}" for spec in ARTIST_PARAMETERS]
+    lines += ["};", "#else"]
+    # repr of a float always has a point or an exponent, and both forms are GLSL float literals.
+    lines += [
+        f"const {_glsl_type(spec)} {constant_name(spec)} = {values[spec.name]!r}; // {spec.unit}"
+        for spec in ARTIST_PARAMETERS
+    ]
+    lines += ["#endif", f"const int VPL_VISIBILITY = {_visibility_code(config)}; // {_VISIBILITY_CODES}"]
     return "\n".join(lines) + "\n"
 
 
-def glsl_name(spec: ParameterSpec) -> str:
-    """The constant's name: VPL_INTENSITY, VPL_COUNT, …"""
+def c_header(config: TunedConfig) -> str:
+    """A C99 and C++ header: each value as a macro with all its digits, and as a struct laid out as the block.
+
+    Raises:
+        InputError: a value is out of range.
+    """
+    values = _checked(config)
+    padding = BLOCK_BYTES // 4 - len(BLOCK_FIELDS)
+    macros = [
+        f"#define {constant_name(spec)} {values[spec.name]!r} /* {spec.unit} */" for spec in ARTIST_PARAMETERS
+    ]
+    members = [
+        f"    {'int32_t' if spec.whole_number else 'float'} {spec.name}; /* {spec.unit} */"
+        for spec in ARTIST_PARAMETERS
+    ]
+    members += [f"    float padding[{padding}];"] * (padding > 0)
+    initial = [
+        f"    {constant_name(spec) if spec.whole_number else f'(float){constant_name(spec)}'},"
+        for spec in ARTIST_PARAMETERS
+    ]
+    return "\n".join(
+        [
+            "/* Written by `vpltune export --to c`. No value has a world unit. */",
+            "#ifndef VPLTUNE_PARAMETERS_H",
+            "#define VPLTUNE_PARAMETERS_H",
+            "#include <stdint.h>",
+            *macros,
+            f"#define VPL_VISIBILITY {_visibility_code(config)} /* {_VISIBILITY_CODES} */",
+            "/* Byte for byte the std140 uniform block of `vpltune export --to std140`. */",
+            "struct vpl_parameters {",
+            *members,
+            "};",
+            "static const struct vpl_parameters vpl_parameters = {",
+            *initial,
+            *["    {0}"] * (padding > 0),
+            "};",
+            "#endif",
+            "",
+        ]
+    )
+
+
+def constant_name(spec: ParameterSpec) -> str:
+    """The constant's name in GLSL and C: VPL_INTENSITY, VPL_COUNT, …"""
     return f"VPL_{spec.name.removeprefix('vpl_').upper()}"
 
 
-def _declaration(spec: ParameterSpec, value: float | int) -> str:
-    glsl_type = "int" if spec.whole_number else "float"
-    # repr of a float always has a point or an exponent, and both forms are GLSL float literals.
-    return f"const {glsl_type} {glsl_name(spec)} = {value!r}; // {spec.unit}"
+def _checked(config: TunedConfig) -> dict[str, float | int]:
+    return ArtistParameters.validated(config.parameters.as_dict()).as_dict()
+
+
+def _glsl_type(spec: ParameterSpec) -> str:
+    return "int" if spec.whole_number else "float"
+
+
+def _visibility_code(config: TunedConfig) -> int:
+    return VISIBILITIES.index(config.visibility)

@@ -8,7 +8,7 @@
 """
 
 import json
-import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
@@ -18,12 +18,14 @@ from typing import Any, Literal, get_args
 from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
 from renderer.atomic_file import write_text_whole
 from renderer.errors import InputError
+from renderer.gltf_extras import GLTF_SUFFIXES, read_gltf_extras
 
 FORMAT = "vpltune"
 VERSION = 1
 DEFAULT_CONFIG_NAME = "default"
 # A real file is about 1 kB; the bound keeps a wrong path (a scene, a device) from being read whole.
 MAXIMUM_FILE_BYTES = 1 << 20
+LARGEST_NUMBER = sys.float_info.max
 
 Visibility = Literal["none", "transmittance", "maps"]
 VISIBILITIES: tuple[Visibility, ...] = get_args(Visibility)
@@ -50,6 +52,8 @@ class TunedConfig:
 def read_config(source: str | Path) -> TunedConfig:
     """Read a config file, or the preset that `configs/default.json` holds for the word "default".
 
+    A .gltf or .glb holds a config where `vpltune export --to gltf` has put one into its extras.
+
     Raises:
         InputError: the file cannot be read, is not JSON, has another format or a later version,
             repeats, lacks or adds a key, or holds a value that is not finite and in range.
@@ -58,6 +62,8 @@ def read_config(source: str | Path) -> TunedConfig:
         text = files("configs").joinpath("default.json").read_text(encoding="utf-8")
         return parse_config(text, "configs/default.json")
     path = Path(source)
+    if path.suffix.lower() in GLTF_SUFFIXES:
+        return parse_config(json.dumps(read_gltf_extras(path)), str(path))
     try:
         with path.open("rb") as file:
             content = file.read(MAXIMUM_FILE_BYTES + 1)
@@ -131,6 +137,9 @@ def config_schema() -> dict[str, Any]:
             "type": "integer" if spec.whole_number else "number",
             "minimum": spec.low,
             "maximum": spec.high,
+            # Says `minimum` once more, the other way round. NaN is no JSON, but parsers let it pass, and of
+            # comparisons with it none fails: turned round, none succeeds.
+            "not": {"exclusiveMaximum": spec.low},
             "default": spec.default,
         }
         for spec in ARTIST_PARAMETERS
@@ -159,7 +168,12 @@ def config_schema() -> dict[str, Any]:
             "provenance": {
                 "description": "Where the numbers come from; never acted on.",
                 "type": "object",
-                "additionalProperties": {"type": ["string", "number"]},
+                "additionalProperties": {
+                    "type": ["string", "number"],
+                    "minimum": -LARGEST_NUMBER,
+                    "maximum": LARGEST_NUMBER,
+                    "not": {"type": "number", "exclusiveMaximum": -LARGEST_NUMBER},
+                },
             },
         },
     }
@@ -207,7 +221,9 @@ def _checked_provenance(provenance: Any, where: str) -> dict[str, str | int | fl
     if not isinstance(provenance, dict):
         raise InputError(f"{where}: key 'provenance' must be an object, got {type(provenance).__name__}")
     for key, value in provenance.items():
-        number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < math.inf
+        number = (
+            isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST_NUMBER
+        )
         if not (number or isinstance(value, str)):
             raise InputError(
                 f"{where}: provenance.{key!r:.60} must be a string or a finite number, got {value!r:.60}"

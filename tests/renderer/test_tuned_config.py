@@ -1,6 +1,8 @@
 """The config file: what is read, what is refused, and that both ends agree."""
 
 import json
+import math
+import re
 from importlib.resources import files
 from pathlib import Path
 
@@ -131,22 +133,36 @@ def test_refusals_are_one_line_that_names_the_file(tmp_path, text, message):
     assert "\n" not in str(refusal.value)
 
 
-@pytest.mark.parametrize(
-    ("name", "literal"),
-    [
-        ("vpl_count", "1.5"),
-        ("vpl_count", "0"),
-        ("intensity", "0"),
-        ("density_exponent", "1.01"),
-        ("intensity", "true"),
-    ],
-)
-def test_the_schema_refuses_what_the_reader_refuses(name, literal):
-    text = parameters_text(name, literal)
-    with pytest.raises(InputError, match=name):
+REFUSED_BY_BOTH = {
+    "unknown parameter": (
+        json.dumps(document(parameters=ArtistParameters().as_dict() | {"radius": 1})),
+        "radius",
+    ),
+    "missing parameter": (json.dumps(document(parameters={"intensity": 1})), "falloff_footprint"),
+    "unknown key": (json.dumps(document(notes="")), "notes"),
+    "missing key": (json.dumps({"format": "vpltune", "version": 1}), "parameters"),
+    "future version": (json.dumps(document(version=2)), "version"),
+    "other format": (json.dumps(document(format="gltf")), "format"),
+    "visibility": (json.dumps(document(visibility="rays")), "visibility"),
+    "provenance NaN": (json.dumps(document(provenance={"seconds": math.nan})), "seconds"),
+    "provenance 1e999": (json.dumps(document(provenance={"seconds": math.inf})), "seconds"),
+    "fractional count": (parameters_text("vpl_count", "1.5"), "vpl_count"),
+    "a bool": (parameters_text("intensity", "true"), "intensity"),
+    **{
+        f"{spec.name} {literal}": (parameters_text(spec.name, literal), spec.name)
+        for spec in ARTIST_PARAMETERS
+        for literal in ("NaN", "1e999", "-1e999", repr(spec.low - 0.01), repr(spec.high * 1.01))
+    },
+}
+
+
+@pytest.mark.parametrize(("text", "key"), REFUSED_BY_BOTH.values(), ids=REFUSED_BY_BOTH)
+def test_schema_and_reader_refuse_the_same_and_name_the_key(text, key):
+    with pytest.raises(InputError, match=key):
         parse_config(text, "text")
-    with pytest.raises(jsonschema.ValidationError):
+    with pytest.raises(jsonschema.ValidationError) as refusal:
         jsonschema.validate(json.loads(text), config_schema())
+    assert key in (*refusal.value.absolute_path, *re.findall(r"'(\w+)'", refusal.value.message))
 
 
 def test_files_that_are_not_text_or_not_there(tmp_path):

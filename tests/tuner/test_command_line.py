@@ -200,7 +200,7 @@ def test_what_libraries_print_does_not_reach_stdout_with_json(capfd, monkeypatch
     def chatty(config, export_format):
         print("from Python")
         os.write(1, b"from C\n")
-        return "text"
+        return b"bytes"
 
     monkeypatch.setattr(renderer.config_export, "exported", chatty)
     assert run(export_to(tmp_path, "--json")) == 0

@@ -78,6 +78,7 @@ class Runtime:
         self.parameters: ArtistParameters = loaded.parameters
         self.visibility: Visibility = loaded.visibility
         self._context = create_context() if context is None else context
+        self.opengl_renderer: str = self._context.info["GL_RENDERER"]
         self._rsm_resolution = rsm_resolution
         self._context.__enter__()
         self.scene_buffers = SceneBuffers(self._context, scene)

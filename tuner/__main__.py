@@ -17,6 +17,7 @@ import typer
 
 from renderer.errors import InputError, MachineError
 from tuner.commands.bench import bench
+from tuner.commands.command_line import command_arguments
 from tuner.commands.doctor import doctor
 from tuner.commands.evaluate import evaluate
 from tuner.commands.export import export
@@ -63,6 +64,7 @@ def main() -> None:
 
 def run(arguments: Sequence[str]) -> int:
     """Run one command line, print what it reports, and return its exit code."""
+    command_arguments.set(tuple(arguments))
     # Asked for here and not in the commands, because it holds from before they load anything.
     json_wanted = "--json" in arguments and not {"-h", "--help"} & set(arguments)
     with stdout_sent_to_stderr() if json_wanted else contextlib.nullcontext():

@@ -9,6 +9,7 @@ from renderer.artist_parameters import ArtistParameters
 from renderer.capture import CapturedFrame
 from renderer.runtime import Runtime
 from renderer.views import View
+from tuner.radiance import radiance
 from tuner.reference.reference_view import ReferenceView
 
 
@@ -47,15 +48,6 @@ class CapturedView:
     ) -> Float32[np.ndarray, "height width 3"]:
         """The runtime's direct light and albedo with some indirect irradiance, W/(m² sr)."""
         return radiance(self.captured.albedo, self.captured.direct_irradiance, indirect_irradiance)
-
-
-def radiance(
-    albedo: Float32[np.ndarray, "height width 3"],
-    direct_irradiance: Float32[np.ndarray, "height width 3"],
-    indirect_irradiance: Float32[np.ndarray, "height width 3"],
-) -> Float32[np.ndarray, "height width 3"]:
-    """L = ρ/π · E. Twin: shaders/material_resolve.comp."""
-    return (albedo / np.float32(np.pi) * (direct_irradiance + indirect_irradiance)).astype(np.float32)
 
 
 def capture_views(

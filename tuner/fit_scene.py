@@ -1,6 +1,7 @@
 """Job one: a scene in, a tuned config and the proof of it out."""
 
 import importlib.metadata
+import platform
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from tuner.fit_falloff import fit_falloff
 from tuner.fit_status import Descent
 from tuner.prepare_scene import PreparedScene, Progress, SceneOptions, Stopwatch, prepare_scene
 from tuner.reference.content_key import scene_digest
+from tuner.view_pictures import write_view_pictures
 
 PANEL_HEIGHT = 240
 """Pixels; the panels of comparison.png are at least this high."""
@@ -24,9 +26,13 @@ PANEL_HEIGHT = 240
 
 @dataclass(frozen=True, eq=False)
 class FitOptions(SceneOptions):
-    """`start`: where the fit begins, and what the parameters that are not fitted stay at."""
+    """`start`: where the fit begins, and what the parameters that are not fitted stay at.
+
+    command: what was typed, for the record; None where the fit was asked for from Python.
+    """
 
     start: TunedConfig = field(default_factory=TunedConfig)
+    command: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +59,7 @@ def fit(
 
     Args:
         scene: a glTF, OBJ or PLY file.
-        output: the folder for tuned.json, views.json, metrics.json and comparison.png.
+        output: the folder for tuned.json, views.json, metrics.json, pictures.npz and comparison.png.
         config: where the fit starts: a config file, or "default".
         progress: called with a stage's name and the share of it that is done, in [0, 1].
         options: fields of `tuner.prepare_scene.SceneOptions`: views, seed, bounces, camera, light, size …
@@ -67,7 +73,7 @@ def fit(
 
 
 def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Progress) -> FitResult:
-    """Fit a scene and write tuned.json, views.json, metrics.json and comparison.png into `output`.
+    """Fit a scene; write tuned.json, views.json, metrics.json, pictures.npz and comparison.png to `output`.
 
     Every file is written whole, and only once the fit and its measurement are done. References are kept
     in the user's cache as they are made, so a run that was stopped goes on where it was.
@@ -103,6 +109,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
     write_comparison(
         output / "comparison.png", prepared.runtime, _first_of_each_split(evaluation), PANEL_HEIGHT
     )
+    write_view_pictures(output / "pictures.npz", evaluation.views)
     write_config(output / "tuned.json", config)
     document = {
         "scene": str(scene_path),
@@ -113,10 +120,22 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
         "seconds": watch.report(),
         "status": "failed" if descent.status.failed else "ok",
         "sentence": descent.status.value,
-        "loss": {"start": descent.start_loss, "end": descent.loss, "steps": len(descent.losses) - 1},
+        "loss": {
+            "start": descent.start_loss,
+            "end": descent.loss,
+            "steps": len(descent.losses) - 1,
+            "curve": descent.losses.tolist(),
+        },
         "ceiling_parameters": evaluation.ceiling_parameters.as_dict(),
         "per_view": evaluation.per_view(),
         "notes": list(prepared.notes),
+        "provenance": {
+            **config.provenance,
+            "python": platform.python_version(),
+            "platform": platform.platform(),
+            "opengl": prepared.runtime.opengl_renderer,
+            "command": options.command,
+        },
     }
     write_text_whole(output / "metrics.json", strict_json(document) + "\n")
     return FitResult(config, descent, evaluation, prepared.notes, document)

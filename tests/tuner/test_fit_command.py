@@ -10,6 +10,8 @@ from renderer.artist_parameters import ARTIST_PARAMETERS
 from renderer.tuned_config import read_config
 from renderer.views import read_views
 from tuner.__main__ import run
+from tuner.view_metrics import relmse
+from tuner.view_pictures import read_view_pictures
 
 SCENE = Path(__file__).resolve().parent.parent.parent / "configs" / "scenes" / "cornell-box.glb"
 STAGES = ("load", "reference", "capture", "fit", "evaluate", "total")
@@ -47,6 +49,27 @@ def test_stdout_and_metrics_are_as_documented(fitted, document):
         for name in ("default", "tuned", "ceiling"):
             assert all(math.isfinite(metrics[name][key]) for key in ("relmse", "energy_ratio", "flip"))
     assert json.loads((fitted / "out" / "metrics.json").read_text()) == document
+
+
+def test_metrics_say_how_they_came_about(fitted, document):
+    provenance = document["provenance"]
+    assert provenance["command"] == f"vpltune fit {SCENE} -o {fitted / 'out'} --views 1 --json"
+    assert len(provenance["scene_sha256"]) == 64
+    assert {"vpltune", "mitsuba", "jax", "python", "platform", "opengl", "seed"} <= set(provenance)
+    loss = document["loss"]
+    assert loss["curve"][0] == loss["start"]
+    assert len(loss["curve"]) == loss["steps"] + 1
+    assert min(loss["curve"]) == pytest.approx(loss["end"])
+
+
+def test_pictures_are_those_that_were_measured(fitted, document):
+    """relMSE of what pictures.npz holds is what metrics.json says, but for the half floats' rounding."""
+    pictures = read_view_pictures(fitted / "out" / "pictures.npz")
+    assert [view.index for view in pictures] == list(range(len(document["per_view"])))
+    for view, figures in zip(pictures, document["per_view"], strict=True):
+        for variant in ("default", "tuned", "ceiling"):
+            shown, real = (view.indirect[name][view.valid] for name in (variant, "reference"))
+            assert relmse(shown, real) == pytest.approx(figures[variant]["relmse"], rel=5e-3)
 
 
 def test_the_tuned_config_holds_the_parameters_and_is_no_worse(fitted, document):

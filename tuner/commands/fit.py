@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from tuner.commands.command_line import command_line
 from tuner.commands.options import (
     LARGEST_VIEW_COUNT,
     Bounces,
@@ -52,7 +53,7 @@ def fit(
     light_cone: LightConeOption = None,
     json: JsonOption = False,
 ) -> Report:
-    """Fit a scene: write DIR/tuned.json, before-and-after pictures, views.json and metrics.json."""
+    """Fit a scene: write DIR/tuned.json, views.json, metrics.json, and pictures before and after."""
     from renderer.tuned_config import read_config
     from tuner.commands.progress_display import shown_progress
     from tuner.commands.view_flags import ViewFlags, camera_from_flags, light_from_flags
@@ -76,6 +77,7 @@ def fit(
         bounces=bounces,
         camera=camera_from_flags(flags),
         light=light_from_flags(flags),
+        command=command_line(),
     )
     with shown_progress() as progress:
         result = fit_scene(scene, output, options, progress)

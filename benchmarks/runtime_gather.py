@@ -118,13 +118,13 @@ def _milliseconds(context: moderngl.Context, draw: Callable[[], object], repeats
 def _gather_milliseconds(context: moderngl.Context, drawn: _Drawn, repeats: int) -> float:
     """Gather, and where it is interleaved, filter and the listed pixels' full gather."""
     camera = drawn.frame.camera(drawn.view)
-    return _milliseconds(context, lambda: drawn.frame._gather(camera, _PARAMETERS), repeats)
+    return _milliseconds(context, lambda: drawn.frame._gather(camera), repeats)
 
 
 def _place(drawn: _Drawn) -> None:
     """From RSM to VPLs: densities, scene length and placement."""
     frame, origin = drawn.frame, drawn.records.moment_origin
-    frame.virtual_point_lights.draw(frame.rsm, origin, _PARAMETERS.density_exponent, (0.0, 0.0))
+    frame.virtual_point_lights.draw(frame.rsm, origin, (0.0, 0.0))
 
 
 def _readback_milliseconds(context: moderngl.Context, drawn: _Drawn) -> tuple[float, float, float]:
@@ -150,8 +150,8 @@ def _indirect_milliseconds(context: moderngl.Context, drawn: _Drawn) -> float:
     def indirect_path() -> None:
         frame._reflective_shadow_map.draw(frame.rsm)
         _place(drawn)
-        frame._gather(camera, _PARAMETERS)
-        frame._with_near_field(camera, len(drawn.view.lights), None, _PARAMETERS)
+        frame._gather(camera)
+        frame._add_near_field(camera, len(drawn.view.lights), None)
 
     return _milliseconds(context, indirect_path, repeats=2)
 

@@ -12,6 +12,7 @@ from renderer.camera_uniforms import CameraUniforms, camera_uniforms
 from renderer.dynamic_lights import DynamicLights
 from renderer.light_faces import FACE_DTYPE, LIGHT_DTYPE, FaceSnapping, LightRecords, light_records
 from renderer.light_pre_pass import LightPrePass
+from renderer.parameter_buffer import ParameterBuffer
 from renderer.passes.direct_light import DirectLightPass
 from renderer.passes.geometry import GeometryPass
 from renderer.passes.interleaved_filter import InterleavedFilterPass
@@ -67,6 +68,7 @@ class Frame:
         self.radiance = create_irradiance_target(context, size)
         self.display = create_display_target(context, size)
 
+        self.parameters = ParameterBuffer(context)
         self._lights: moderngl.Buffer | None = None
         self._faces = context.buffer(reserve=max(1, face_count) * FACE_DTYPE.itemsize)
         self._geometry = GeometryPass(context, scene)
@@ -102,18 +104,21 @@ class Frame:
         """Draw `view` up to the irradiance buffers."""
         camera = self.camera(view)
         self._bind_lights(records)
+        self.parameters.write(parameters)
+        self.parameters.bind()
         self._geometry.draw(camera, self.gbuffer)
         accumulated = self.light_pre_pass.draw(camera, lights)
         self._reflective_shadow_map.draw(self.rsm)
-        self.virtual_point_lights.draw(
-            self.rsm, records.moment_origin, parameters.density_exponent, table_rotation
-        )
+        self.virtual_point_lights.draw(self.rsm, records.moment_origin, table_rotation)
         self._cast_visibility_maps()
         self._direct_light.draw(
             camera, self.gbuffer, self.rsm, len(view.lights), accumulated, self.direct_irradiance
         )
-        self._gather(camera, parameters)
-        self.indirect_irradiance = self._with_near_field(camera, len(view.lights), accumulated, parameters)
+        self._gather(camera)
+        self.indirect_irradiance = self.vpl_irradiance
+        if parameters.screen_space_strength > 0.0:
+            self._add_near_field(camera, len(view.lights), accumulated)
+            self.indirect_irradiance = self.near_field_irradiance
 
     def resolve(self, share: tuple[float, float], exposure: float | None) -> None:
         """From the irradiance buffers to radiance and the display picture.
@@ -143,26 +148,20 @@ class Frame:
             low, high = self._scene.bounds()
             self.vpl_visibility_maps.draw(self._hierarchy, float(np.linalg.norm(high - low)))
 
-    def _gather(self, camera: CameraUniforms, parameters: ArtistParameters) -> None:
+    def _gather(self, camera: CameraUniforms) -> None:
         count, picture = self.virtual_point_lights.count, self.vpl_irradiance
         if self._interleaved_filter is None:
-            self._vpl_gather.draw(camera, self.gbuffer, count, parameters, picture)
+            self._vpl_gather.draw(camera, self.gbuffer, count, picture)
             return
-        self._vpl_gather.draw(camera, self.gbuffer, count, parameters, self._interleaved_irradiance)
+        self._vpl_gather.draw(camera, self.gbuffer, count, self._interleaved_irradiance)
         self._interleaved_filter.draw(
             camera, self.gbuffer, self._interleaved_irradiance, picture, pixel_list=self._pixel_list
         )
-        self._vpl_gather.refine(camera, self.gbuffer, count, parameters, self._pixel_list, picture)
+        self._vpl_gather.refine(camera, self.gbuffer, count, self._pixel_list, picture)
 
-    def _with_near_field(
-        self,
-        camera: CameraUniforms,
-        light_count: int,
-        accumulated: LightAccumulation | None,
-        parameters: ArtistParameters,
-    ) -> moderngl.Texture:
-        if parameters.screen_space_strength == 0.0:
-            return self.vpl_irradiance
+    def _add_near_field(
+        self, camera: CameraUniforms, light_count: int, accumulated: LightAccumulation | None
+    ) -> None:
         self._screen_space_indirect.draw(
             camera,
             self.gbuffer,
@@ -170,7 +169,6 @@ class Frame:
             accumulated,
             light_count,
             self.virtual_point_lights.count,
-            parameters,
             self._interleaved_irradiance,
         )
         self._screen_space_filter.draw(
@@ -180,7 +178,6 @@ class Frame:
             self.near_field_irradiance,
             base=self.vpl_irradiance,
         )
-        return self.near_field_irradiance
 
     def _bind_lights(self, records: LightRecords) -> None:
         size = max(1, len(records.lights)) * LIGHT_DTYPE.itemsize

@@ -38,6 +38,9 @@ BLOCK_FIELDS: tuple[BlockField, ...] = tuple(
 )
 """In the table's order."""
 
+BLOCK_MEMBERS = " ".join(f"{field.glsl_type} {field.name};" for field in BLOCK_FIELDS)
+"""Their declarations, on one line."""
+
 BLOCK_BYTES = -(-4 * len(BLOCK_FIELDS) // _BLOCK_ALIGNMENT) * _BLOCK_ALIGNMENT
 """Size of the block with std140's padding."""
 
@@ -58,10 +61,14 @@ def pack_parameters(parameters: ArtistParameters) -> bytes:
     Raises:
         InputError: a value is out of range.
     """
-    checked = ArtistParameters.validated(parameters.as_dict())
+    return parameter_bytes(ArtistParameters.validated(parameters.as_dict()))
+
+
+def parameter_bytes(parameters: ArtistParameters) -> bytes:
+    """As `pack_parameters`, of any values: what the runtime draws with may lie beyond what a file may hold."""
     # Zeros first: numpy leaves the padding of a record as it finds it.
     block = np.zeros(1, _BLOCK_DTYPE)
-    for name, value in checked.as_dict().items():
+    for name, value in parameters.as_dict().items():
         block[name] = value
     return block.tobytes()
 

@@ -7,7 +7,8 @@ from importlib import resources
 import moderngl
 import numpy as np
 
-Define = int | float | bool
+Define = int | float | bool | str
+"""A number, or a piece of GLSL on one line."""
 
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 # Mesa: "0:12(5): error: …"; NVIDIA: "0(12) : error C1008: …".

@@ -7,6 +7,7 @@
 // For γ = 1 the texel's own area drops out: A = Φ_total / (N B), each VPL the same flux.
 // Where several lights shine on one point, each has VPLs of its own, wider than l: less is then given than
 // was lost, never more.
+#include "common/artist_parameters.glsl"
 #include "common/gbuffer.glsl"
 #include "common/rsm.glsl"
 #include "common/scene_length.glsl"
@@ -19,7 +20,6 @@ uniform sampler2D light_accumulation;  // dynamic lights have no VPLs, and so lo
 uniform float accumulation_unit;       // irradiance [W/m²] of a stored 1; 0 where there is none
 uniform int vpl_count;
 uniform int light_count;
-uniform float density_exponent;
 
 layout(rgba32f, binding = 0) writeonly uniform image2D out_emitters;  // radiosity [W/m²], l² [world units²]
 
@@ -64,9 +64,9 @@ void main() {
     float level = mean_flux(radiosity);
     float area = 0.0;
     if (level > 0.0) {
-        area = total_weight / (float(vpl_count) * pow(level, density_exponent));
-        if (density_exponent < 1.0) {
-            area *= pow(rsm_texel_area(gbuffer_receiver(pixel)), 1.0 - density_exponent);
+        area = total_weight / (float(vpl_count) * pow(level, artist.density_exponent));
+        if (artist.density_exponent < 1.0) {
+            area *= pow(rsm_texel_area(gbuffer_receiver(pixel)), 1.0 - artist.density_exponent);
         }
     }
     imageStore(out_emitters, pixel, vec4(radiosity, area / PI));

@@ -8,6 +8,7 @@
 //
 // Samples lie evenly in angle and in the logarithm of the radius, for the integrand falls as 1/r² in a corner.
 // The pixels of a 4×4 block take different runs of one R2 sequence; the interleaved filter puts them together.
+#include "common/artist_parameters.glsl"
 #include "common/gbuffer.glsl"
 #include "common/pixel_area.glsl"
 #include "common/scene_length.glsl"
@@ -15,11 +16,6 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 uniform sampler2D emitters;
-uniform float intensity;
-uniform float falloff_footprint;
-uniform float falloff_transmittance;
-uniform float screen_space_radius;
-uniform float screen_space_strength;
 
 layout(std430, binding = VPL_FOOTPRINT_BINDING) readonly buffer VplFootprint {
     float mean_vpl_footprint;
@@ -43,11 +39,11 @@ vec3 near_field(Receiver receiver, ivec2 at) {
     float cosine_emitter = max(-dot(surface.normal_world, to_emitter), 0.0);
 
     float area = pixel_area(surface, textureSize(emitters, 0));
-    float softening = falloff_footprint * falloff_footprint * emitter.a;
+    float softening = artist.falloff_footprint * artist.falloff_footprint * emitter.a;
     float lost = softening / (distance_squared + softening);
     // The pixel itself is a disc, not a point: with its area, no neighbour gives more than its form factor.
     float form = cosine_receiver * cosine_emitter / distance_squared / (distance_squared + area / PI);
-    float transmittance = exp(-falloff_transmittance * sqrt(distance_squared) / scene_length);
+    float transmittance = exp(-artist.falloff_transmittance * sqrt(distance_squared) / scene_length);
     return emitter.rgb * (area / PI * form * lost * transmittance);
 }
 
@@ -65,7 +61,7 @@ void main() {
     float view_depth = near_plane / texelFetch(gbuffer_depth, pixel, 0).r;
     float pixel_footprint = 2.0 * tan_half_fov.y * view_depth / float(size.y);
     // No farther than the picture is high: what is beyond would not be seen either.
-    float radius = min(screen_space_radius * mean_vpl_footprint / pixel_footprint, float(size.y));
+    float radius = min(artist.screen_space_radius * mean_vpl_footprint / pixel_footprint, float(size.y));
     vec3 irradiance = vec3(0.0);
     if (radius > NEAREST_PIXEL) {
         float stretch = log(radius / NEAREST_PIXEL);
@@ -80,7 +76,7 @@ void main() {
                 irradiance += near_field(receiver, at) * (reach * reach);
             }
         }
-        irradiance *= intensity * screen_space_strength * 2.0 * PI * stretch / float(SAMPLES);
+        irradiance *= artist.intensity * artist.screen_space_strength * 2.0 * PI * stretch / float(SAMPLES);
     }
     imageStore(out_irradiance, pixel, vec4(irradiance, 1.0));
 }

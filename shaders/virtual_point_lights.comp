@@ -1,5 +1,6 @@
 // VPLs: points of the table warped to the density over RSM texels, by inverting first the marginal over
 // rows, then the conditional along the row. No value leaves the GPU.
+#include "common/artist_parameters.glsl"
 #include "common/rsm.glsl"
 #include "common/scene_length.glsl"
 #include "common/point_table.glsl"
@@ -21,7 +22,6 @@ layout(std430, binding = VIRTUAL_POINT_LIGHTS_BINDING) writeonly buffer VirtualP
 
 uniform int vpl_count;
 uniform int rows;
-uniform float density_exponent;
 uniform vec2 table_rotation;  // Cranley and Patterson (1976)
 
 const VirtualPointLight NO_VPL = VirtualPointLight(vec4(0.0), vec4(0.0, 0.0, 1.0, 0.0), vec4(0.0));
@@ -67,7 +67,7 @@ VirtualPointLight texel_vpl(ivec2 texel, vec2 within) {
             RsmTexel near = rsm_texel(ivec2(x, y));
             float near_flux = mean_flux(near.flux);
             if (near_flux > 0.0) {
-                weight += pow(near_flux, density_exponent);
+                weight += pow(near_flux, artist.density_exponent);
                 area += near.area;
                 flux += near.flux;
             }

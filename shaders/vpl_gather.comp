@@ -3,6 +3,7 @@
 // out among themselves, n² times as bright. A workgroup takes pixels of one place in their blocks, so that all
 // of its pixels read the same VPLs (Segovia et al. 2006, done here by arithmetic on the pixel's index).
 // With LISTED_PIXELS, the pixels are those of the list, for which sharing did not do.
+#include "common/artist_parameters.glsl"
 #include "common/gbuffer.glsl"
 #include "common/scene_length.glsl"
 #include "common/virtual_point_lights.glsl"
@@ -23,18 +24,12 @@ layout(std430, binding = VIRTUAL_POINT_LIGHTS_BINDING) readonly buffer VirtualPo
 layout(rgba32f, binding = 0) writeonly uniform image2D out_irradiance;
 
 uniform int vpl_count;
-uniform float intensity;
-uniform float falloff_footprint;
-uniform float falloff_transmittance;
 
 const int SUBSETS = INTERLEAVE * INTERLEAVE;
 
 shared VirtualPointLight batch[64];
 #if VISIBILITY_MAP_SIZE > 0
 shared mat3 batch_frame[64];
-
-uniform float visibility_bias;
-uniform float visibility_softness;
 #endif
 
 ivec2 own_pixel(int subset) {
@@ -52,8 +47,11 @@ void main() {
     int end = (subset + 1) * vpl_count / SUBSETS;
     ivec2 pixel = own_pixel(subset);
     ivec2 size = imageSize(out_irradiance);
-    FalloffParameters parameters =
-        FalloffParameters(intensity * float(SUBSETS), falloff_footprint, falloff_transmittance);
+    FalloffParameters parameters = FalloffParameters(
+        artist.intensity * float(SUBSETS), artist.falloff_footprint, artist.falloff_transmittance);
+#if VISIBILITY_MAP_SIZE > 0
+    VisibilityParameters visibility = VisibilityParameters(artist.visibility_bias, artist.visibility_softness);
+#endif
     Receiver receiver = gbuffer_receiver(clamp(pixel, ivec2(0), size - 1));
     vec3 irradiance = vec3(0.0);
     for (int start = first; start < end; start += 64) {
@@ -74,8 +72,7 @@ void main() {
             if (any(greaterThan(unoccluded, vec3(0.0)))) {
                 unoccluded *= vpl_visibility(
                     receiver.position_world, receiver.normal_world, batch[i], batch_frame[i],
-                    (start + i) * (VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE), scene_length,
-                    VisibilityParameters(visibility_bias, visibility_softness));
+                    (start + i) * (VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE), scene_length, visibility);
             }
 #endif
             irradiance += unoccluded;

@@ -1,5 +1,6 @@
 // VPL density, part 1: for each row of the RSM atlas, the running sum of the sampling weights and the
 // moments of the flux. One workgroup per row.
+#include "common/artist_parameters.glsl"
 #include "common/rsm.glsl"
 
 layout(local_size_x = ROW_GROUP_SIZE) in;
@@ -17,7 +18,6 @@ layout(std430, binding = ROW_MOMENTS_BINDING) writeonly buffer RowMomentsBuffer 
     RowMoments row_moments[];
 };
 
-uniform float density_exponent;
 uniform vec3 moment_origin;
 
 shared float scan[ROW_GROUP_SIZE];
@@ -40,7 +40,7 @@ void main() {
         RsmTexel texel = rsm_texel(ivec2(column, row));
         float flux = mean_flux(texel.flux);
         if (flux > 0.0) {
-            float weight = pow(flux, density_exponent);
+            float weight = pow(flux, artist.density_exponent);
             total += weight;
             vec3 offset = texel.position_world - moment_origin;
             flux_position += flux * vec4(offset, 1.0);

@@ -6,6 +6,7 @@ import numpy as np
 from renderer import buffer_bindings
 from renderer.artist_parameters import ArtistParameters
 from renderer.frame import Frame
+from renderer.parameter_buffer import ParameterBuffer
 from renderer.passes.virtual_point_lights import VPL_BYTES
 from renderer.passes.vpl_gather import VplGatherPass
 from renderer.render_targets import create_irradiance_target
@@ -32,6 +33,7 @@ class GatheredVpls:
         self.count = count
         self.buffer = context.buffer(reserve=max(1, count) * VPL_BYTES)
         self.irradiance = create_irradiance_target(context, frame.size)
+        self._parameters = ParameterBuffer(context)
         self._gather = VplGatherPass(context)
 
     def upload(self, vpls: np.ndarray) -> None:
@@ -43,5 +45,7 @@ class GatheredVpls:
         frame = self._frame
         frame.virtual_point_lights.bind()
         self.buffer.bind_to_storage_buffer(buffer_bindings.VIRTUAL_POINT_LIGHTS)
-        self._gather.draw(frame.camera(view), frame.gbuffer, self.count, parameters, self.irradiance)
+        self._parameters.write(parameters)
+        self._parameters.bind()
+        self._gather.draw(frame.camera(view), frame.gbuffer, self.count, self.irradiance)
         return self.irradiance

@@ -3,7 +3,6 @@
 import moderngl
 
 from renderer import buffer_bindings
-from renderer.artist_parameters import ArtistParameters
 from renderer.camera_uniforms import CameraUniforms
 from renderer.point_table import R2_STEPS
 from renderer.render_targets import GBuffer, LightAccumulation, create_irradiance_target
@@ -48,10 +47,9 @@ class ScreenSpaceIndirectPass:
         accumulated: LightAccumulation | None,
         light_count: int,
         vpl_count: int,
-        parameters: ArtistParameters,
         interleaved_irradiance: moderngl.Texture,
     ) -> None:
-        """Gather for the lights, faces and VPLs that are bound; `accumulated` light has no VPLs: left out."""
+        """Gather for the lights, faces, VPLs and parameters that are bound; `accumulated` light has no VPLs: left out."""
         context = self._context
         groups = (-(-interleaved_irradiance.width // 8), -(-interleaved_irradiance.height // 8))
         self._footprint.bind_to_storage_buffer(buffer_bindings.VPL_FOOTPRINT)
@@ -71,7 +69,6 @@ class ScreenSpaceIndirectPass:
             accumulation_unit=0.0 if accumulated is None else accumulated.unit,
             vpl_count=vpl_count,
             light_count=light_count,
-            density_exponent=parameters.density_exponent,
         )
         self._emitter_picture.bind_to_image(0, read=False, write=True)
         self._emitters.run(*groups)
@@ -79,15 +76,7 @@ class ScreenSpaceIndirectPass:
 
         camera.bind_gbuffer(self._program, gbuffer, 0)
         self._emitter_picture.use(2)
-        set_uniforms(
-            self._program,
-            emitters=2,
-            intensity=parameters.intensity,
-            falloff_footprint=parameters.falloff_footprint,
-            falloff_transmittance=parameters.falloff_transmittance,
-            screen_space_radius=parameters.screen_space_radius,
-            screen_space_strength=parameters.screen_space_strength,
-        )
+        set_uniforms(self._program, emitters=2)
         interleaved_irradiance.bind_to_image(0, read=False, write=True)
         self._program.run(*groups)
         context.memory_barrier(context.TEXTURE_FETCH_BARRIER_BIT)

@@ -52,20 +52,18 @@ class VirtualPointLightsPass:
         self,
         rsm: ReflectiveShadowMap,
         moment_origin: tuple[float, float, float],
-        density_exponent: float,
         table_rotation: tuple[float, float],
     ) -> None:
-        """Place the VPLs.
+        """Place the VPLs, by the density exponent γ that is bound: chance ∝ flux^γ over lit texels.
 
-        `density_exponent` γ: chance ∝ flux^γ over lit texels. `table_rotation` shifts the
-        point table on its torus, in [0, 1)².
+        `table_rotation` shifts the point table on its torus, in [0, 1)².
         """
         for binding, buffer in self._buffers.items():
             buffer.bind_to_storage_buffer(binding)
         self.bind()
         context = self._context
         rsm.bind(self._row_density, 0)
-        set_uniforms(self._row_density, density_exponent=density_exponent, moment_origin=moment_origin)
+        set_uniforms(self._row_density, moment_origin=moment_origin)
         self._row_density.run(rsm.rows)
         context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT)
         set_uniforms(self._marginal_density, rows=rsm.rows)
@@ -76,7 +74,6 @@ class VirtualPointLightsPass:
             self._placement,
             vpl_count=self.count,
             rows=rsm.rows,
-            density_exponent=density_exponent,
             table_rotation=table_rotation,
         )
         self._placement.run(-(-self.count // 64))

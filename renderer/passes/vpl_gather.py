@@ -3,7 +3,6 @@
 import moderngl
 
 from renderer import buffer_bindings
-from renderer.artist_parameters import ArtistParameters
 from renderer.camera_uniforms import CameraUniforms
 from renderer.render_targets import GBuffer, PixelList
 from renderer.shader_library import load_compute, set_uniforms
@@ -29,11 +28,10 @@ class VplGatherPass:
         camera: CameraUniforms,
         gbuffer: GBuffer,
         vpl_count: int,
-        parameters: ArtistParameters,
         irradiance: moderngl.Texture,
     ) -> None:
-        """Gather from the VPLs that are bound."""
-        self._bind(self._program, camera, gbuffer, vpl_count, parameters, irradiance)
+        """Gather from the VPLs, with the parameters, that are bound."""
+        self._bind(self._program, camera, gbuffer, vpl_count, irradiance)
         side = 8 * self._interleave
         groups = (-(-irradiance.width // side), -(-irradiance.height // side))
         self._program.run(*groups, self._interleave**2)
@@ -44,13 +42,12 @@ class VplGatherPass:
         camera: CameraUniforms,
         gbuffer: GBuffer,
         vpl_count: int,
-        parameters: ArtistParameters,
         pixel_list: PixelList,
         irradiance: moderngl.Texture,
     ) -> None:
         """Gather in full at the listed pixels of an interleaved picture, and leave the others as they are."""
         assert self._listed_program is not None, "a full gather has nothing to refine"
-        self._bind(self._listed_program, camera, gbuffer, vpl_count, parameters, irradiance)
+        self._bind(self._listed_program, camera, gbuffer, vpl_count, irradiance)
         pixel_list.bind()
         self._listed_program.run_indirect(pixel_list.buffer)
         self._context.memory_barrier(self._context.TEXTURE_FETCH_BARRIER_BIT)
@@ -70,17 +67,8 @@ class VplGatherPass:
         camera: CameraUniforms,
         gbuffer: GBuffer,
         vpl_count: int,
-        parameters: ArtistParameters,
         irradiance: moderngl.Texture,
     ) -> None:
         camera.bind_gbuffer(program, gbuffer, 0)
-        set_uniforms(
-            program,
-            vpl_count=vpl_count,
-            intensity=parameters.intensity,
-            falloff_footprint=parameters.falloff_footprint,
-            falloff_transmittance=parameters.falloff_transmittance,
-            visibility_bias=parameters.visibility_bias,
-            visibility_softness=parameters.visibility_softness,
-        )
+        set_uniforms(program, vpl_count=vpl_count)
         irradiance.bind_to_image(0, read=False, write=True)

@@ -65,7 +65,7 @@ def pack_parameters(parameters: ArtistParameters) -> bytes:
 
 
 def parameter_bytes(parameters: ArtistParameters) -> bytes:
-    """As `pack_parameters`, of any values: what the runtime draws with may lie beyond what a file may hold."""
+    """As `pack_parameters`, of any values: the runtime may draw with what no file may hold."""
     # Zeros first: numpy leaves the padding of a record as it finds it.
     block = np.zeros(1, _BLOCK_DTYPE)
     for name, value in parameters.as_dict().items():

@@ -49,7 +49,10 @@ class ScreenSpaceIndirectPass:
         vpl_count: int,
         interleaved_irradiance: moderngl.Texture,
     ) -> None:
-        """Gather for the lights, faces, VPLs and parameters that are bound; `accumulated` light has no VPLs: left out."""
+        """Gather for the lights, faces, VPLs and parameters that are bound.
+
+        `accumulated` light has no VPLs and is left out.
+        """
         context = self._context
         groups = (-(-interleaved_irradiance.width // 8), -(-interleaved_irradiance.height // 8))
         self._footprint.bind_to_storage_buffer(buffer_bindings.VPL_FOOTPRINT)

@@ -83,10 +83,17 @@ def bin_vpls(
 
 def gather_binned(binned: BinnedGather, parameters: FalloffParameters) -> Float[Array, "receivers 3"]:
     """Indirect irradiance [W/m²] at every receiver, as `tuner.vpl_gather.gather` gives it."""
-    softening = parameters.falloff_footprint * binned.footprint[None, :] / binned.distance[:, None]
-    transmittance = jnp.exp(-parameters.falloff_transmittance * binned.distance)[:, None]
-    falloff = (transmittance / (1.0 + softening**2)).ravel()
+    falloff = node_falloff(binned.distance, binned.footprint, parameters)
     return parameters.intensity * jnp.matmul(binned.irradiance, falloff, precision=jax.lax.Precision.HIGHEST)
+
+
+def node_falloff(
+    distance: Float[Array, "distances"], footprint: Float[Array, "footprints"], parameters: FalloffParameters
+) -> Float[Array, "nodes"]:
+    """f(d, l) at the nodes of a grid, in the order of `BinnedGather.irradiance`."""
+    softening = parameters.falloff_footprint * footprint[None, :] / distance[:, None]
+    transmittance = jnp.exp(-parameters.falloff_transmittance * distance)[:, None]
+    return (transmittance / (1.0 + softening**2)).ravel()
 
 
 def _grid(receivers: Receivers, vpls: VirtualPointLights) -> tuple[np.ndarray, np.ndarray]:

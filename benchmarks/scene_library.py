@@ -20,6 +20,7 @@ OUTSIDE_SCENES = {
     "nvpro-cornellbox": "cornellBox.gltf",
     "playcanvas-chess-board": "chess-board.glb",
     "playcanvas-house": "house.glb",
+    "sketchfab-macross-diorama": "scene.glb",
 }
 """Every scene of others that can be loaded: folder and file."""
 

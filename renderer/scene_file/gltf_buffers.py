@@ -7,6 +7,7 @@ import urllib.parse
 
 from renderer.scene_file.diagnostics import SceneFileError
 from renderer.scene_file.gltf_document import GltfDocument
+from renderer.scene_file.gltf_meshopt import decompressed_view
 from renderer.scene_file.json_object import JsonObject
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
@@ -18,6 +19,7 @@ class GltfBuffers:
     def __init__(self, document: GltfDocument) -> None:
         self._document = document
         self._buffers: dict[str, memoryview] = {}
+        self._decompressed_views: dict[str, memoryview] = {}
 
     def view(self, holder: JsonObject, key: str = "bufferView") -> tuple[memoryview, int | None]:
         """The bytes of the buffer view that `holder` refers to by `key`, and its byteStride if it has one.
@@ -29,17 +31,24 @@ class GltfBuffers:
         view = views[holder.required_index(key, len(views), "bufferViews")]
         # Strides above 252 or off a multiple of four break a rule of the format, but are clear.
         stride = view.integer("byteStride", low=1, high=2**31) if "byteStride" in view.members else None
-        if view.extension("EXT_meshopt_compression") is not None and self._is_placeholder(view):
-            raise SceneFileError(
-                f"{view.where}: EXT_meshopt_compression is not read; store the scene plain or with Draco"
-            )
+        compression = view.extension("EXT_meshopt_compression")
+        if compression is not None and self._is_placeholder(view):
+            return self._decompressed(view, compression), stride
         return self._slice(view), stride
 
     def _is_placeholder(self, view: JsonObject) -> bool:
-        """Whether the buffer only stands in for what would be decompressed (its key `fallback`)."""
-        buffer = self._document.referred(view, "buffer", "buffers")
-        extension = None if buffer is None else buffer.extension("EXT_meshopt_compression")
-        return extension is not None and extension.boolean("fallback", False)
+        """Whether the buffer only stands in for what is to be decompressed: it has no bytes of its own."""
+        buffers = self._document.list_of("buffers")
+        index = view.required_index("buffer", len(buffers), "buffers")
+        in_file = index == 0 and self._document.binary_chunk is not None
+        return "uri" not in buffers[index].members and not in_file
+
+    def _decompressed(self, view: JsonObject, compression: JsonObject) -> memoryview:
+        if view.where not in self._decompressed_views:
+            self._decompressed_views[view.where] = decompressed_view(
+                self._slice(compression), view, compression, self._document.decoded
+            )
+        return self._decompressed_views[view.where]
 
     def _slice(self, view: JsonObject) -> memoryview:
         start = view.integer("byteOffset", 0)

@@ -22,6 +22,7 @@ SCENES = [
     ("playcanvas-house/house.glb", 10497, 0.736, 1, 0, 0),
     ("babylon-marble-tower/marbleTower.gltf", 78972, 68.7, 3, 0, 0),
     ("playcanvas-chess-board/chess-board.glb", 178845, 436, 3, 0, 0),
+    ("sketchfab-macross-diorama/scene.glb", 102822, 8.04, 0, 0, 0),
 ]
 
 
@@ -57,7 +58,6 @@ def test_missing_textures_of_the_open_map_are_named(scenes_folder):
     [
         ("bitterli-living-room/scene.xml", "Mitsuba XML is not read"),
         ("bitterli-staircase2/scene.xml", "Mitsuba XML is not read"),
-        ("sketchfab-macross-diorama/scene.glb", "EXT_meshopt_compression is not read"),
     ],
 )
 def test_what_is_not_read_is_refused_in_one_line(scenes_folder, path, message):

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 
-def strict_json(document: Mapping[str, Any]) -> str:
-    """`document` as indented JSON text without NaN or Infinity, which JSON has no words for."""
-    return json.dumps(_finite(document), indent=2, allow_nan=False)
+def strict_json(document: Mapping[str, Any], indent: int | None = 2) -> str:
+    """`document` as JSON text without NaN or Infinity, which JSON lacks; `indent` None: in one line."""
+    return json.dumps(_finite(document), indent=indent, allow_nan=False)
 
 
 def _finite(value: Any) -> Any:

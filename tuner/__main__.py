@@ -16,6 +16,7 @@ from pathlib import Path
 import typer
 
 from renderer.errors import InputError, MachineError
+from tuner.commands.batch import batch
 from tuner.commands.bench import bench
 from tuner.commands.command_line import command_arguments
 from tuner.commands.doctor import doctor
@@ -45,7 +46,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (fit, render, evaluate, export, doctor, bench):
+for command in (fit, batch, render, evaluate, export, doctor, bench):
     app.command()(command)
 
 

@@ -21,7 +21,7 @@ from renderer.tuned_config import TunedConfig, read_config, write_config
 from tuner.__main__ import run
 from tuner.commands.options import Layer
 
-COMMANDS = ("fit", "render", "evaluate", "export", "doctor", "bench")
+COMMANDS = ("fit", "batch", "render", "evaluate", "export", "doctor", "bench")
 REPOSITORY = Path(__file__).resolve().parent.parent.parent
 
 
@@ -96,6 +96,15 @@ REFUSED = {
     "bounces": (["fit", SCENE, "-o", "out", "--bounces", "3"], "'3' is not one of '1', 'all'"),
     "seed": (["fit", SCENE, "-o", "out", "--seed", "-1"], "Invalid value for '--seed'"),
     "export to": (["export", "default", "--to", "hlsl", "-o", "a"], "'hlsl' is not one of 'json', 'glsl'"),
+    "fit size": (["fit", SCENE, "-o", "out", "--size", "64"], "--size: must be WxH with sides"),
+    "no library": (["batch", "absent", "-o", "out"], "absent: cannot be read"),
+    "workers": (["batch", ".", "-o", "out", "--workers", "0"], "Invalid value for '--workers'"),
+    "time limit": (["batch", ".", "-o", "out", "--time-limit", "0"], "--time-limit: must be .* above 0"),
+    "memory limit": (
+        ["batch", ".", "-o", "out", "--memory-limit", "4T"],
+        "--memory-limit: must be like 900M or 4G, got '4T'",
+    ),
+    "no scenes": (["batch", ".", "-o", "out"], "has no .gltf, .glb, .obj, .ply, .xml file below it"),
     "no benchmark": (["bench", "cooking"], "bench: NAME must be one of .*, got 'cooking'"),
 }
 

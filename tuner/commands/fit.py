@@ -21,8 +21,10 @@ from tuner.commands.options import (
     LookAtOption,
     SceneArgument,
     SeedOption,
+    ViewSizeOption,
     VisibilityOption,
     YfovOption,
+    parse_size,
 )
 from tuner.commands.report import OK, PARTLY_DONE, Report, warn
 
@@ -37,6 +39,7 @@ def fit(
         str, typer.Option(metavar="START.json", help="Start from this config: a file, or `default`.")
     ] = "default",
     views: Annotated[int, typer.Option(min=1, max=LARGEST_VIEW_COUNT, help="How many views to fit.")] = 2,
+    size: ViewSizeOption = None,
     seed: SeedOption = 0,
     visibility: VisibilityOption = None,
     bounces: Annotated[
@@ -78,6 +81,7 @@ def fit(
         camera=camera_from_flags(flags),
         light=light_from_flags(flags),
         command=command_line(),
+        **({} if size is None else {"size": parse_size(size)}),
     )
     with shown_progress() as progress:
         result = fit_scene(scene, output, options, progress)

@@ -31,6 +31,10 @@ VisibilityOption = Annotated[
     Literal["none", "transmittance", "maps"] | None,
     typer.Option(help="What stands for occluders of VPLs; else what the config says.", show_default=False),
 ]
+ViewSizeOption = Annotated[
+    str | None,
+    typer.Option("--size", metavar="WxH", help="Of the views, in pixels. [128x96]", show_default=False),
+]
 SeedOption = Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of everything random.")]
 
 VIEW_PANEL = "Camera and light, in world units (else: the scene's own, or chosen)"

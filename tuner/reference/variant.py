@@ -6,7 +6,7 @@ one works; else `scalar_rgb` serves, slowly. The answer is kept in the cache fol
 of the libraries changes.
 
 Environment variables: VPLTUNE_MITSUBA_VARIANT forces `llvm_ad_rgb` or `scalar_rgb` untried;
-DRJIT_LIBLLVM_PATH names the only LLVM library to try.
+DRJIT_LIBLLVM_PATH names the only LLVM library to try; VPLTUNE_THREADS is how many threads Dr.Jit uses.
 """
 
 import contextlib
@@ -70,6 +70,11 @@ def select_variant() -> MitsubaVariant:
 
     if mitsuba.variant() != variant.name:
         mitsuba.set_variant(variant.name)
+        threads = os.environ.get("VPLTUNE_THREADS", "")
+        if threads.isdecimal() and int(threads) > 0:
+            import drjit
+
+            drjit.set_thread_count(int(threads))
     return variant
 
 

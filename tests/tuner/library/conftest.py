@@ -1,0 +1,27 @@
+"""A small library, jobs over it, and a cache that is not the user's."""
+
+import hashlib
+from pathlib import Path
+
+import pytest
+
+from renderer.tuned_config import TunedConfig, config_text
+from tuner.library.job import Job, JobOptions
+
+CORNELL_BOX = Path(__file__).resolve().parents[3] / "configs" / "scenes" / "cornell-box.glb"
+
+
+@pytest.fixture
+def make_job(tmp_path):
+    """A job over a scene file with a few bytes in it, or over `scene`."""
+
+    def make(name: str = "room.glb", scene: Path | None = None, size: int = 1) -> Job:
+        if scene is None:
+            scene = tmp_path / "library" / name
+            scene.parent.mkdir(exist_ok=True)
+            scene.write_bytes(b"no scene")
+        key = hashlib.sha256(str(scene).encode()).hexdigest()
+        options = JobOptions(start=config_text(TunedConfig()), views=1, size=(32, 24))
+        return Job(key, str(scene), name, str(tmp_path / "out"), options, size)
+
+    return make

@@ -1,0 +1,180 @@
+"""`vpltune batch`: a library of scenes in, a record and a tuned config for each out."""
+
+import os
+import re
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from renderer.errors import InputError
+from tuner.commands.options import (
+    LARGEST_VIEW_COUNT,
+    Bounces,
+    JsonOption,
+    SeedOption,
+    ViewSizeOption,
+    VisibilityOption,
+    parse_size,
+)
+from tuner.commands.report import OK, PARTLY_DONE, Report
+
+if TYPE_CHECKING:
+    from tuner.library.batch import BatchResult, Scheduler
+
+RUN_PANEL = "How it is run"
+MEMORY_UNITS = {"M": 2**20, "G": 2**30}
+
+
+def batch(
+    library: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LIBRARY",
+            help="A folder, with all scenes below it, or a text file that names a scene a line.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="DIR", help="Folder for records, log, and each scene's fit."),
+    ],
+    config: Annotated[
+        str, typer.Option(metavar="START.json", help="Start from this config: a file, or `default`.")
+    ] = "default",
+    views: Annotated[
+        int, typer.Option(min=1, max=LARGEST_VIEW_COUNT, help="How many views of each scene to fit.")
+    ] = 2,
+    size: ViewSizeOption = None,
+    seed: SeedOption = 0,
+    visibility: VisibilityOption = None,
+    bounces: Annotated[
+        Bounces, typer.Option(help="What to fit to: one bounce, or full global illumination.")
+    ] = "1",
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=1024,
+            help="Scenes at a time. [cores ÷ threads]",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
+        ),
+    ] = None,
+    threads: Annotated[
+        int, typer.Option(min=1, max=1024, help="Cores for each scene.", rich_help_panel=RUN_PANEL)
+    ] = 1,
+    retries: Annotated[
+        int,
+        typer.Option(
+            min=0, max=100, help="Further attempts at a scene that failed.", rich_help_panel=RUN_PANEL
+        ),
+    ] = 3,
+    retry_failed: Annotated[
+        bool, typer.Option(help="Try scenes again that failed before.", rich_help_panel=RUN_PANEL)
+    ] = False,
+    time_limit: Annotated[
+        float,
+        typer.Option(
+            metavar="SECONDS", help="For each attempt; then it is stopped.", rich_help_panel=RUN_PANEL
+        ),
+    ] = 3600.0,
+    memory_limit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N[M|G]",
+            help="For each scene, in MiB or GiB. [the machine's ÷ workers]",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
+        ),
+    ] = None,
+    tensorboard: Annotated[
+        bool, typer.Option(help="Write loss curves for TensorBoard too.", rich_help_panel=RUN_PANEL)
+    ] = False,
+    json: JsonOption = False,
+) -> Report:
+    """Tune every scene of a library; run again, it goes on where it was, and does nothing twice."""
+    from renderer.tuned_config import config_text, read_config
+    from tuner.commands.batch_display import shown_batch
+    from tuner.commands.command_line import command_line
+    from tuner.library.batch import run_batch
+    from tuner.library.job import JobOptions
+
+    options = JobOptions(
+        start=config_text(read_config(config).seen_by(visibility)),
+        views=views,
+        seed=seed,
+        bounces=bounces,
+        size=None if size is None else parse_size(size),
+    )
+    cores = len(os.sched_getaffinity(0))
+    count = workers or max(1, cores // threads)
+    scheduler = _local(count, threads, time_limit, memory_limit, retries)
+    with shown_batch(count) as watcher:
+        result = run_batch(
+            library,
+            output,
+            options,
+            scheduler,
+            watcher,
+            retry_failed=retry_failed,
+            tensorboard=tensorboard,
+            command=command_line(),
+        )
+    return _report(result, output)
+
+
+def _local(
+    workers: int, threads: int, time_limit: float, memory_limit: str | None, retries: int
+) -> "Scheduler":
+    from tuner.library.local_scheduler import tune_locally
+    from tuner.library.supervised_process import Limits, machine_memory_bytes
+
+    if not time_limit > 0.0:
+        raise InputError(f"--time-limit: must be a number of seconds above 0, got {time_limit}")
+    memory = machine_memory_bytes() // workers if memory_limit is None else parse_memory(memory_limit)
+    return partial(tune_locally, workers=workers, threads=threads, limits=Limits(time_limit, memory, retries))
+
+
+def parse_memory(text: str) -> int:
+    """Bytes from "900M" or "4G"; a number alone counts MiB.
+
+    Raises:
+        InputError: the text is of another form, or zero.
+    """
+    match = re.fullmatch(r"([0-9]{1,9})([MG]?)", text.upper())
+    size = int(match[1]) * MEMORY_UNITS[match[2] or "M"] if match else 0
+    if not size:
+        raise InputError(f"--memory-limit: must be like 900M or 4G, got {text!r:.60}")
+    return size
+
+
+def _report(result: "BatchResult", output: Path) -> Report:
+    from rich.markup import escape
+    from rich.table import Table
+
+    from tuner.library.record import as_document
+
+    counts = {status: result.count(status) for status in ("done", "failed", "refused")}
+    document = {
+        "status": "ok" if counts["done"] == len(result.records) else "partly done",
+        **counts,
+        "fitted": result.fitted,
+        "copies": result.copies,
+        "output": str(output),
+        "records": [as_document(record) for record in result.records],
+    }
+    troubled = [record for record in result.records if record.status != "done"]
+    table = Table(title="Not tuned", title_justify="left")
+    for heading in ("scene", "", "why"):
+        table.add_column(heading, overflow="fold")
+    for record in troubled:
+        table.add_row(escape(record.name), record.status, escape(record.reason))
+    sentence = ", ".join(f"{count} {status}" for status, count in counts.items() if count)
+    shown = (
+        *((table,) if troubled else ()),
+        f"{sentence}; {result.fitted} of them in this run",
+        f"records: {escape(str(output / 'records'))}",
+    )
+    return Report(document, shown, PARTLY_DONE if troubled else OK)

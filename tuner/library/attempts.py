@@ -1,0 +1,52 @@
+"""All attempts at one scene: until it has a record, or is set aside with the reason of the last."""
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from tuner.library.job import Job
+from tuner.library.record import Record
+from tuner.library.supervised_process import Limits, SupervisedProcess
+from tuner.library.tune_one import set_aside
+
+Report = Callable[[dict[str, Any]], None]
+"""Called with events: `{"event": "attempt_failed", …}`, `{"event": "stage", …}`."""
+
+
+def tune_with_retries(process: SupervisedProcess, job: Job, limits: Limits, report: Report) -> Record | None:
+    """The record of `job`; None while another process is at work on it.
+
+    Raises:
+        MachineError: this machine cannot fit anything.
+        StoppedError: the batch was stopped.
+    """
+
+    def progress(stage: str, share: float) -> None:
+        report({"event": "stage", "key": job.key, "name": job.name, "stage": stage, "share": share})
+
+    for number in range(1, limits.retries + 2):
+        attempt = process.attempt(job, number, limits, progress)
+        if attempt.record is not None or not attempt.failure:
+            return attempt.record
+        report(
+            {
+                "event": "attempt_failed",
+                "key": job.key,
+                "name": job.name,
+                "attempt": number,
+                "seconds": attempt.seconds,
+                "reason": attempt.failure,
+            }
+        )
+    return set_aside(job, attempt.failure, number, attempt.seconds)
+
+
+_of_this_thread = threading.local()
+
+
+def tune_in_own_process(job: Job, limits: Limits, threads: int, report: Report) -> Record | None:
+    """The same, with a process that belongs to the calling thread and serves its next scene too."""
+    process = getattr(_of_this_thread, "process", None)
+    if process is None:
+        process = _of_this_thread.process = SupervisedProcess(threads, threading.Event())
+    return tune_with_retries(process, job, limits, report)

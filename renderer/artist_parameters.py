@@ -158,6 +158,17 @@ ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
         fitted=False,
     ),
     ParameterSpec(
+        name="density_importance",
+        symbol="η",
+        default=0.0,
+        low=0.0,
+        high=1.0,
+        scale="linear",
+        unit="exponent",
+        meaning="how far VPLs go where the camera would miss them: 0 not at all, 1 for the least error",
+        fitted=False,
+    ),
+    ParameterSpec(
         name="screen_space_radius",
         symbol="ρ",
         # What is withheld falls as 1/d⁴: at 3 footprints, little is left beyond. Contacts of six scenes were
@@ -205,6 +216,7 @@ class ArtistParameters:
     visibility_softness: float = float(_SPECS["visibility_softness"].default)
     vpl_count: int = int(_SPECS["vpl_count"].default)
     density_exponent: float = float(_SPECS["density_exponent"].default)
+    density_importance: float = float(_SPECS["density_importance"].default)
     screen_space_radius: float = float(_SPECS["screen_space_radius"].default)
     screen_space_strength: float = float(_SPECS["screen_space_strength"].default)
 

@@ -1,6 +1,7 @@
 """One frame, as the diagram has it.
 
-G-buffer ► lights ► RSM ► VPLs ► visibility maps ► gather ► filter ► screen-space ► resolve ► tone curve.
+G-buffer ► lights ► RSM ► importance ► VPLs ► visibility maps ► gather ► filter ► screen-space
+► resolve ► tone curve.
 """
 
 import moderngl
@@ -23,6 +24,7 @@ from renderer.passes.screen_space_indirect import ScreenSpaceIndirectPass
 from renderer.passes.tone_mapping import ToneMappingPass
 from renderer.passes.virtual_point_lights import VirtualPointLightsPass
 from renderer.passes.vpl_gather import VplGatherPass
+from renderer.passes.vpl_importance import VplImportancePass, importance_cells
 from renderer.passes.vpl_visibility_maps import VplVisibilityMapsPass
 from renderer.ray_hierarchy import RayHierarchy
 from renderer.render_targets import (
@@ -74,8 +76,10 @@ class Frame:
         self._geometry = GeometryPass(context, scene)
         self.light_pre_pass = LightPrePass(context, self.gbuffer, options.light_path)
         self._reflective_shadow_map = ReflectiveShadowMapPass(context, scene)
+        self._vpl_importance = VplImportancePass(context, self.rsm)
+        cells = importance_cells(self.rsm.face_count)
         self.virtual_point_lights = VirtualPointLightsPass(
-            context, self.rsm, vpl_count, options.point_table, options.rsm_filtering
+            context, self.rsm, vpl_count, options.point_table, options.rsm_filtering, cells
         )
         self._direct_light = DirectLightPass(context, rsm_resolution)
         self._hierarchy = hierarchy
@@ -88,7 +92,7 @@ class Frame:
         if options.interleave > 1:
             self._pixel_list = create_pixel_list(context, size)
             self._interleaved_filter = InterleavedFilterPass(context, options.interleave, refine=True)
-        self._screen_space_indirect = ScreenSpaceIndirectPass(context, size, rsm_resolution)
+        self._screen_space_indirect = ScreenSpaceIndirectPass(context, size, rsm_resolution, cells)
         self._screen_space_filter = InterleavedFilterPass(context, SCREEN_SPACE_BLOCK, add_base=True)
         self._material_resolve = MaterialResolvePass(context)
         self._tone_mapping = ToneMappingPass(context)
@@ -109,6 +113,9 @@ class Frame:
         self._geometry.draw(camera, self.gbuffer)
         accumulated = self.light_pre_pass.draw(camera, lights)
         self._reflective_shadow_map.draw(self.rsm)
+        if parameters.density_importance > 0.0:
+            self._vpl_importance.draw(camera, self.gbuffer, self.rsm)
+        self._vpl_importance.bind()
         self.virtual_point_lights.draw(self.rsm, records.moment_origin, table_rotation)
         self._cast_visibility_maps()
         self._direct_light.draw(

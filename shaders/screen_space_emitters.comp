@@ -1,15 +1,17 @@
 // What every pixel gives to its neighbourhood: its radiosity from direct light, and the squared footprint that
 // a VPL has which is drawn on its surface.
 //
-// A draw takes RSM texel i, of area A_i and reflected flux Φ_i, with chance p_i = Φ_i^γ / W, W = Σ Φ_i^γ. Its VPL
-// stands for the area A = A_i / (N p_i) = A_i W / (N Φ_i^γ). Where the radiosity is B, Φ_i = B A_i, so
-//     A = A_i^(1-γ) W / (N B^γ),    l² = A / π.
-// For γ = 1 the texel's own area drops out: A = Φ_total / (N B), each VPL the same flux.
+// A draw takes RSM texel i, of area A_i and reflected flux Φ_i, with chance p_i = Φ_i^γ F_i / W, W = Σ Φ_i^γ F_i,
+// F_i the factor of its importance. Its VPL stands for the area A = A_i / (N p_i) = A_i W / (N Φ_i^γ F_i). Where the
+// radiosity is B, Φ_i = B A_i, so
+//     A = A_i^(1-γ) W / (N B^γ F_i),    l² = A / π.
+// For γ = 1 the texel's own area drops out: A = Φ_total / (N B) without importance, each VPL the same flux.
 // Where several lights shine on one point, each has VPLs of its own, wider than l: less is then given than
 // was lost, never more.
 #include "common/artist_parameters.glsl"
 #include "common/gbuffer.glsl"
 #include "common/rsm.glsl"
+#include "common/vpl_importance.glsl"
 #include "common/scene_length.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -23,10 +25,15 @@ uniform int light_count;
 
 layout(rgba32f, binding = 0) writeonly uniform image2D out_emitters;  // radiosity [W/m²], l² [world units²]
 
-// Area on the surface of the RSM texel that sees it: of the light that shines on it most, shadows aside.
-float rsm_texel_area(Receiver receiver) {
+struct SeeingTexel {
+    float area;        // on the surface
+    float importance;  // factor of its weight
+};
+
+// The RSM texel that sees a surface: of the light that shines on it most, shadows aside.
+SeeingTexel rsm_texel_seeing(Receiver receiver) {
     float most = 0.0;
-    float area = 0.0;
+    SeeingTexel result = SeeingTexel(0.0, 1.0);
     for (int i = 0; i < light_count; ++i) {
         Light light = lights[i];
         vec3 to_light = towards_light(light, receiver.position_world);
@@ -43,11 +50,14 @@ float rsm_texel_area(Receiver receiver) {
                 vec2 side = face.extent * (2.0 * depth / RSM_RESOLUTION);
                 float tilt = face.orthographic != 0 ? 1.0 : depth / length(position_face);
                 most = arriving;
-                area = side.x * side.y * tilt / max(cosine, RSM_MIN_COSINE);
+                vec2 place = (position_face.xy / (face.extent * depth) * 0.5 + 0.5) * RSM_RESOLUTION;
+                result.area = side.x * side.y * tilt / max(cosine, RSM_MIN_COSINE);
+                result.importance = artist.density_importance > 0.0
+                    ? importance_factor(f, min(ivec2(place), ivec2(RSM_RESOLUTION - 1))) : 1.0;
             }
         }
     }
-    return area;
+    return result;
 }
 
 void main() {
@@ -65,8 +75,11 @@ void main() {
     float area = 0.0;
     if (level > 0.0) {
         area = total_weight / (float(vpl_count) * pow(level, artist.density_exponent));
-        if (artist.density_exponent < 1.0) {
-            area *= pow(rsm_texel_area(gbuffer_receiver(pixel)), 1.0 - artist.density_exponent);
+        if (artist.density_exponent < 1.0 || artist.density_importance > 0.0) {
+            SeeingTexel texel = rsm_texel_seeing(gbuffer_receiver(pixel));
+            area /= texel.importance;
+            // 0 to the power of 0 is not defined where no light's texel was found.
+            area *= artist.density_exponent < 1.0 ? pow(texel.area, 1.0 - artist.density_exponent) : 1.0;
         }
     }
     imageStore(out_emitters, pixel, vec4(radiosity, area / PI));

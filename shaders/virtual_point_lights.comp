@@ -2,6 +2,7 @@
 // rows, then the conditional along the row. No value leaves the GPU.
 #include "common/artist_parameters.glsl"
 #include "common/rsm.glsl"
+#include "common/vpl_importance.glsl"
 #include "common/scene_length.glsl"
 #include "common/point_table.glsl"
 #include "common/virtual_point_lights.glsl"
@@ -67,7 +68,7 @@ VirtualPointLight texel_vpl(ivec2 texel, vec2 within) {
             RsmTexel near = rsm_texel(ivec2(x, y));
             float near_flux = mean_flux(near.flux);
             if (near_flux > 0.0) {
-                weight += pow(near_flux, artist.density_exponent);
+                weight += sampling_weight(ivec2(x, y), near_flux);
                 area += near.area;
                 flux += near.flux;
             }

@@ -2,6 +2,7 @@
 // moments of the flux. One workgroup per row.
 #include "common/artist_parameters.glsl"
 #include "common/rsm.glsl"
+#include "common/vpl_importance.glsl"
 
 layout(local_size_x = ROW_GROUP_SIZE) in;
 
@@ -40,7 +41,7 @@ void main() {
         RsmTexel texel = rsm_texel(ivec2(column, row));
         float flux = mean_flux(texel.flux);
         if (flux > 0.0) {
-            float weight = pow(flux, artist.density_exponent);
+            float weight = sampling_weight(ivec2(column, row), flux);
             total += weight;
             vec3 offset = texel.position_world - moment_origin;
             flux_position += flux * vec4(offset, 1.0);

@@ -19,9 +19,15 @@ NEAREST_PIXEL = 0.7
 class ScreenSpaceIndirectPass:
     """G-buffer, direct irradiance, VPLs → interleaved irradiance from nearby pixels."""
 
-    def __init__(self, context: moderngl.Context, size: tuple[int, int], rsm_resolution: int):
+    def __init__(
+        self, context: moderngl.Context, size: tuple[int, int], rsm_resolution: int, importance_cells: int
+    ):
         self._context = context
-        defines = {**buffer_bindings.DEFINES, "RSM_RESOLUTION": rsm_resolution}
+        defines = {
+            **buffer_bindings.DEFINES,
+            "RSM_RESOLUTION": rsm_resolution,
+            "IMPORTANCE_CELLS": importance_cells,
+        }
         self._mean_footprint = load_compute(context, "vpl_mean_footprint", defines)
         self._emitters = load_compute(context, "screen_space_emitters", defines)
         self._program = load_compute(

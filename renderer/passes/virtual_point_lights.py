@@ -26,6 +26,7 @@ class VirtualPointLightsPass:
         count: int,
         table: PointTable = "r2",
         rsm_filtering: int = 1,
+        importance_cells: int = 1,
     ):
         self._context = context
         self.count = count
@@ -34,6 +35,7 @@ class VirtualPointLightsPass:
             "RSM_RESOLUTION": rsm.resolution,
             "RSM_FILTERING": rsm_filtering,
             "ROW_GROUP_SIZE": ROW_GROUP_SIZE,
+            "IMPORTANCE_CELLS": importance_cells,
         }
         self._row_density = load_compute(context, "vpl_row_density", defines)
         self._marginal_density = load_compute(context, "vpl_marginal_density", defines)
@@ -54,7 +56,7 @@ class VirtualPointLightsPass:
         moment_origin: tuple[float, float, float],
         table_rotation: tuple[float, float],
     ) -> None:
-        """Place the VPLs, by the density exponent γ that is bound: chance ∝ flux^γ over lit texels.
+        """Place the VPLs, by the densities γ and η and the importance that are bound: chance ∝ flux^γ · F.
 
         `table_rotation` shifts the point table on its torus, in [0, 1)².
         """

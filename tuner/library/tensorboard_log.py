@@ -42,5 +42,5 @@ def _add_scene(writer: Any, folder: Path, record: dict[str, Any]) -> None:
         for step, variant in enumerate(("default", "tuned")):
             relmse = variants.get(variant, {}).get("relmse")
             if relmse is not None:
-                writer.add_scalar(f"relmse {split}/{record['name']}", relmse, step)
+                writer.add_scalar(f"relmse_{split}/{record['name']}", relmse, step)
     writer.flush()

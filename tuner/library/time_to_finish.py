@@ -11,6 +11,9 @@ FIRST_GUESS_SECONDS = 10.0
 FIRST_GUESS_SECONDS_PER_MIB = 0.5
 """Of a scene, before any was done: the order of magnitude on one core at the default size."""
 
+DEVIATIONS = 1.9
+"""Standard deviations that a forecast spans to each side: the truth lies in it four times in five or more."""
+
 
 @dataclass
 class SceneSeconds:
@@ -30,11 +33,25 @@ class SceneSeconds:
         return intercept + slope * input_bytes
 
     def spread(self) -> float:
-        """Standard deviation of what scenes took about what was expected of them, in seconds."""
+        """Standard deviation of what scenes took, as a share of what was expected of them."""
         if len(self.seconds_done) < 2:
-            return self.expected(0)
+            return 1.0
         pairs = zip(self.bytes_done, self.seconds_done, strict=True)
-        return pstdev([seconds - self.expected(size) for size, seconds in pairs])
+        shares = [seconds / expected for size, seconds in pairs if (expected := self.expected(size)) > 0.0]
+        return pstdev(shares, 1.0) if shares else 1.0
+
+    def deviation_of_sum(self, sizes: Sequence[int]) -> float:
+        """Standard deviation of the seconds of all of `sizes` together, the line's own doubt included.
+
+        That of predictions from a line through n points (Draper and Smith 1998, 1.4), summed over scenes,
+        with a scatter that grows with the scene.
+        """
+        mean = fmean(self.bytes_done)
+        variance = sum((size - mean) ** 2 for size in self.bytes_done)
+        away = (fmean(sizes) - mean) ** 2 / variance if variance else 0.0
+        expected = [self.expected(size) for size in sizes]
+        each = sum(seconds**2 for seconds in expected)
+        return self.spread() * (each + sum(expected) ** 2 * (1.0 / len(self.bytes_done) + away)) ** 0.5
 
     def _line(self) -> tuple[float, float]:
         if not self.seconds_done:
@@ -53,7 +70,7 @@ class SceneSeconds:
 def seconds_left(
     model: SceneSeconds, waiting: Iterable[int], running: Iterable[tuple[int, float]], workers: int
 ) -> tuple[float, float]:
-    """Low and high estimate of the seconds until the last scene is done, about two deviations apart each way.
+    """Low and high estimate of the seconds until the last scene is done, `DEVIATIONS` to each side.
 
     Args:
         model: what scenes took so far.
@@ -61,16 +78,16 @@ def seconds_left(
         running: bytes of each scene at work, and the seconds it has had.
         workers: how many scenes are done at a time.
     """
-    spread = model.spread()
-    begun = [max(model.expected(size) - had, 0.0) for size, had in running]
-    to_come = [model.expected(size) for size in waiting]
-    count = len(begun) + len(to_come)
-    if not count:
+    waiting, running = list(waiting), list(running)
+    sizes = waiting + [size for size, _ in running]
+    if not sizes:
         return 0.0, 0.0
-    share = (sum(begun) + sum(to_come)) / workers
-    middle = max(share, max(begun + to_come))
-    # Deviations of scenes average out over a worker's share of them; that of the last one does not.
-    off = 2.0 * spread * max(1.0, (count / workers) ** 0.5)
+    left = [model.expected(size) for size in waiting]
+    left += [max(model.expected(size) - had, 0.0) for size, had in running]
+    # Shared out evenly, but for whoever gets the last scene.
+    last = (1.0 - 1.0 / workers) * fmean(left)
+    middle = max(sum(left) / workers + 0.5 * last, *left)
+    off = DEVIATIONS * model.deviation_of_sum(sizes) / workers + model.spread() * last
     return max(middle - off, 0.0), middle + off
 
 

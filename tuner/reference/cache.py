@@ -20,6 +20,7 @@ from tuner.reference.reference_view import ReferenceView
 SIZE_LIMIT = 2 * 2**30
 """Bytes kept; beyond them, the entries that were not used for longest go."""
 
+_SUFFIX = ".reference"
 _DIGEST_BYTES = 32
 _log = logging.getLogger(__name__)
 
@@ -31,14 +32,14 @@ def cache_folder() -> Path:
 
 
 def load(key: str) -> ReferenceView | None:
-    """The entry of `key`, or None where there is none or it is not what was written."""
+    """The entry of `key`, or None where there is none or it is not what was written under that key."""
     path = _path(key)
     try:
         data = path.read_bytes()
     except OSError:
         return None
     payload = data[_DIGEST_BYTES:]
-    if hashlib.sha256(payload).digest() != data[:_DIGEST_BYTES]:
+    if _digest(key, payload) != data[:_DIGEST_BYTES]:
         _log.warning("%s: damaged, made again", path)
         return None
     with contextlib.suppress(OSError):
@@ -49,14 +50,20 @@ def load(key: str) -> ReferenceView | None:
 
 
 def store(key: str, reference: ReferenceView) -> None:
-    """Keep `reference` under `key`, whole or not at all; a folder that cannot be written to is no error."""
+    """Keep `reference` under `key`, whole or not at all; a folder that cannot be written to is no error.
+
+    Whoever stores holds `locked(key)`.
+    """
     arrays = {field.name: np.asarray(getattr(reference, field.name)) for field in fields(reference)}
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)
     payload = buffer.getvalue()
+    path = _path(key)
     try:
-        with written_whole(_path(key)) as temporary:
-            temporary.write_bytes(hashlib.sha256(payload).digest() + payload)
+        for leftover in path.parent.glob(f".{key}-*{_SUFFIX}"):  # of a process killed while it wrote
+            leftover.unlink(missing_ok=True)
+        with written_whole(path) as temporary:
+            temporary.write_bytes(_digest(key, payload) + payload)
         _drop_oldest()
     except (OSError, InputError) as error:
         _log.warning("references are not kept: %s", error)
@@ -69,29 +76,47 @@ def locked(key: str) -> Iterator[None]:
     The lock is the kernel's own and ends with its process, however that ends.
     """
     path = _path(key).with_suffix(".lock")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
-    except OSError:
+    handle = _lock(path)
+    if handle is None:
         yield
         return
     try:
-        with contextlib.suppress(OSError):  # some network file systems cannot lock
-            fcntl.flock(handle, fcntl.LOCK_EX)
         yield
     finally:
-        # Unlinked while held: whoever waits on it finds the entry made, and no lock files pile up.
+        # Unlinked while held: no lock files pile up, and whoever waits on this one sees that it is gone.
         path.unlink(missing_ok=True)
         os.close(handle)
 
 
+def _lock(path: Path) -> int | None:
+    """An open file that holds the lock; None where the folder cannot be written to."""
+    while True:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        except OSError:
+            return None
+        with contextlib.suppress(OSError):  # some network file systems cannot lock
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        # A lock on a file that its last holder unlinked keeps nobody off.
+        with contextlib.suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(handle), path.stat()):
+                return handle
+        os.close(handle)
+
+
+def _digest(key: str, payload: bytes) -> bytes:
+    # The key too: an entry under another's name is as wrong as a torn one.
+    return hashlib.sha256(key.encode() + payload).digest()
+
+
 def _path(key: str) -> Path:
-    return cache_folder() / "references" / f"{key}.npz.sha256"
+    return cache_folder() / "references" / f"{key}{_SUFFIX}"
 
 
 def _drop_oldest() -> None:
     entries = []
-    for path in (cache_folder() / "references").glob("*.npz.sha256"):
+    for path in (cache_folder() / "references").glob(f"*{_SUFFIX}"):
         with contextlib.suppress(OSError):
             status = path.stat()
             entries.append((status.st_mtime, status.st_size, path))

@@ -2,9 +2,11 @@
 
 import hashlib
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+import tuner.fit_scene
 from renderer.tuned_config import TunedConfig, config_text
 from tuner.library.job import Job, JobOptions
 
@@ -25,3 +27,22 @@ def make_job(tmp_path):
         return Job(key, str(scene), name, str(tmp_path / "out"), options, size)
 
     return make
+
+
+@pytest.fixture
+def fits(monkeypatch):
+    """Takes the place of a fit: which scenes were fitted, and what each ends with."""
+    log = SimpleNamespace(scenes=[], error=None, status="ok", files={"tuned.json": "{}"})
+
+    def fit_scene(scene_path, output, options, progress):
+        log.scenes.append(scene_path.name)
+        if log.error is not None:
+            raise log.error
+        output.mkdir(parents=True)
+        for name, content in log.files.items():
+            (output / name).write_text(content)
+        seconds = {"fit": 1.0, "total": 2.0}
+        return SimpleNamespace(document={"status": log.status, "sentence": "settled", "seconds": seconds})
+
+    monkeypatch.setattr(tuner.fit_scene, "fit_scene", fit_scene)
+    return log

@@ -158,12 +158,9 @@ def test_the_key_follows_options_but_not_where_the_start_came_from():
     assert len({job_key("d", options) for options in [plain, *others]} | {job_key("e", plain)}) == 7
 
 
-def test_shared_library_has_twelve_scenes_to_tune_and_three_to_refuse(scenes_folder, tmp_path):
-    found = library_scenes(scenes_folder, leave_out=tmp_path)
+def test_scenes_of_others_are_found_and_what_is_left_is_mitsubas(scenes_folder, tmp_path):
+    """The meshes of Mitsuba scenes, 80 OBJ files, are no scenes of their own."""
+    found = set(library_scenes(scenes_folder, leave_out=tmp_path))
     tuned = {f"{folder}/{file}" for folder, file in OUTSIDE_SCENES.items()}
-    assert set(found) - tuned == {
-        "bitterli-living-room/scene.xml",
-        "bitterli-staircase2/scene.xml",
-        "sketchfab-macross-diorama/scene.glb",
-    }
-    assert tuned < set(found)
+    assert tuned < found
+    assert {Path(name).name for name in found - tuned} == {"scene.xml"}

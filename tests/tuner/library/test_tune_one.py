@@ -2,34 +2,14 @@
 
 import json
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
-import tuner.fit_scene
 from renderer.errors import InputError, MachineError
 from tuner.library.claim import claimed
 from tuner.library.job import Job
 from tuner.library.record import Records
 from tuner.library.tune_one import set_aside, tune_one
-
-
-@pytest.fixture
-def fits(monkeypatch):
-    """Takes the place of a fit: which scenes were fitted, and what each ends with."""
-    log = SimpleNamespace(scenes=[], error=None, status="ok")
-
-    def fit_scene(scene_path, output, options, progress):
-        log.scenes.append(scene_path.name)
-        if log.error is not None:
-            raise log.error
-        output.mkdir(parents=True)
-        (output / "tuned.json").write_text("{}")
-        seconds = {"fit": 1.0, "total": 2.0}
-        return SimpleNamespace(document={"status": log.status, "sentence": "settled", "seconds": seconds})
-
-    monkeypatch.setattr(tuner.fit_scene, "fit_scene", fit_scene)
-    return log
 
 
 def records_of(job: Job) -> Records:

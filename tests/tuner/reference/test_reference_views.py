@@ -4,6 +4,7 @@ import os
 import pickle
 import subprocess
 import sys
+import threading
 from dataclasses import replace
 
 import numpy as np
@@ -142,7 +143,7 @@ def test_anything_that_matters_makes_another_reference(shapes, monkeypatch, tmp_
     assert len(made) == len(variations)
 
 
-@pytest.mark.parametrize("damage", ["truncated", "flipped", "empty"])
+@pytest.mark.parametrize("damage", ["truncated", "flipped", "zeroed", "empty", "swapped"])
 def test_damaged_entries_are_made_again(shapes, monkeypatch, tmp_path, damage, caplog):
     no_cache(monkeypatch, tmp_path)
     scene, view = shapes.box_room(), shapes.box_room_view((8, 6))
@@ -152,7 +153,11 @@ def test_damaged_entries_are_made_again(shapes, monkeypatch, tmp_path, damage, c
     data = bytearray(entry.read_bytes())
     if damage == "flipped":
         data[len(data) // 2] ^= 1
-    entry.write_bytes({"truncated": data[: len(data) // 2], "flipped": data, "empty": b""}[damage])
+    others = {"truncated": data[: len(data) // 2], "flipped": data, "zeroed": bytes(len(data)), "empty": b""}
+    # Whole and right, but of another view.
+    reference_views(scene, (view,), **arguments | {"seed": 1})
+    (other,) = set((tmp_path / "references").iterdir()) - {entry}
+    entry.write_bytes(others.get(damage, other.read_bytes()))
     assert same(made, reference_views(scene, (view,), **arguments)[0])
     assert "damaged" in caplog.text
     caplog.clear()
@@ -232,8 +237,9 @@ def test_scalar_fallback_agrees_within_noise(shapes, tmp_path):
             assert np.mean(np.abs(made[name] - half)) < 0.005 * mean
 
 
-def test_two_processes_make_a_reference_once(shapes, tmp_path):
-    """Both start at once on the same view; one renders, the other waits and finds it."""
+@pytest.mark.parametrize("count", [2, pytest.param(8, marks=pytest.mark.slow)])
+def test_processes_make_a_reference_once(shapes, tmp_path, count):
+    """All start at once on the same view; one renders, the others wait and find it."""
     (tmp_path / "job").write_bytes(pickle.dumps((shapes.box_room(), shapes.box_room_view((32, 24)))))
     program = (
         "import pickle, sys; from tuner.reference import references;"
@@ -249,9 +255,58 @@ def test_two_processes_make_a_reference_once(shapes, tmp_path):
             stdout=subprocess.PIPE,
             text=True,
         )
-        for _ in range(2)
+        for _ in range(count)
     ]
     said = "".join(process.communicate(timeout=100)[0] for process in running)
-    assert [process.returncode for process in running] == [0, 0]
+    assert [process.returncode for process in running] == [0] * count
     assert said.count("rendered") == 1
-    assert [path.suffix for path in (tmp_path / "cache" / "references").iterdir()] == [".sha256"]
+    assert [path.suffix for path in (tmp_path / "cache" / "references").iterdir()] == [".reference"]
+
+
+def test_a_killed_renderer_hands_over_and_leaves_nothing(shapes, tmp_path):
+    """It is killed while it writes; the next makes the reference, and takes the torn file away."""
+    scene, view = shapes.box_room(), shapes.box_room_view((8, 6))
+    (tmp_path / "job").write_bytes(pickle.dumps((scene, view)))
+    program = (
+        "import os, pickle, sys; from pathlib import Path; from tuner.reference import references\n"
+        "scene, view = pickle.load(open(sys.argv[1], 'rb'))\n"
+        "def chmod(path, mode):\n    if path.suffix == '.reference': os.kill(os.getpid(), 9)\n"
+        "if sys.argv[2] == 'dies': Path.chmod = chmod\n"
+        "references.reference_views(scene, (view,), noise_target=0.0, max_samples=16)"
+    )
+    folder = tmp_path / "cache" / "references"
+    for fate, code, left in (("dies", -9, [".lock", ".reference"]), ("lives", 0, [".reference"])):
+        done = subprocess.run(
+            [sys.executable, "-c", program, str(tmp_path / "job"), fate],
+            env=os.environ | {"VPLTUNE_CACHE": str(tmp_path / "cache")},
+            timeout=100,
+        )
+        assert done.returncode == code
+        assert sorted(path.suffix for path in folder.iterdir()) == left
+
+
+def test_a_lock_that_was_unlinked_under_a_waiting_process_keeps_others_off(monkeypatch, tmp_path):
+    """The second to come waits on a file that goes; it must not work beside the third, with a new one."""
+    no_cache(monkeypatch, tmp_path)
+    order = []
+
+    def second():
+        with cache.locked("key"):
+            order.append("second")
+            third.start()
+            third.join(0.3)
+            order.append("second out")
+
+    def third_comes():
+        with cache.locked("key"):
+            order.append("third")
+
+    third = threading.Thread(target=third_comes)
+    waiting = threading.Thread(target=second)
+    with cache.locked("key"):
+        waiting.start()
+        waiting.join(0.2)
+    waiting.join()
+    third.join()
+    assert order == ["second", "second out", "third"]
+    assert list((tmp_path / "references").iterdir()) == []

@@ -6,6 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SYSTEM_STAMP := $(VENV)/.system-libraries
 PYTHON_STAMP := $(VENV)/.python-packages
+TEST_STAMP := $(VENV)/.test-programs
 # Fit and tests are long single processes: two pytest workers keep two cores busy.
 WORKERS ?= 2
 
@@ -21,10 +22,10 @@ setup: $(PYTHON_STAMP) ## system libraries, virtual environment, Python packages
 demo: setup ## fit the shipped Cornell box; pictures and numbers go to out/demo
 	@$(BIN)/vpltune fit configs/scenes/cornell-box.glb -o out/demo
 
-test: setup ## the tests that a change must pass
+test: setup $(TEST_STAMP) ## the tests that a change must pass
 	@$(BIN)/python -m pytest -q -n $(WORKERS) -m "not slow"
 
-test-all: setup ## every test, the slow ones too
+test-all: setup $(TEST_STAMP) ## every test, the slow ones too
 	@$(BIN)/python -m pytest -q -n $(WORKERS)
 
 bench: setup ## the benchmarks
@@ -58,3 +59,8 @@ $(PYTHON_STAMP): $(SYSTEM_STAMP) requirements.txt pyproject.toml
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check --require-hashes -r requirements.txt
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $@
+
+# The browser that tests open reports in; `make demo` does without. Asked for again until it is there.
+$(TEST_STAMP): scripts/install_system_libraries.sh $(PYTHON_STAMP)
+	@PYTHON=$(PYTHON) sh scripts/install_system_libraries.sh chromium
+	@! command -v chromium >/dev/null || touch $@

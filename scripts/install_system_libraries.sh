@@ -1,8 +1,8 @@
 #!/bin/sh
 # Installs with apt what pip cannot bring: EGL and Mesa's software OpenGL for the runtime, LLVM for
-# Mitsuba, and venv for the Python that is used. Where that needs root and we are not, or where
-# there is no apt, it says in one line what to install. It fails only for venv: without the
-# libraries `vpltune doctor` still runs, and says what is lost.
+# Mitsuba, venv for the Python that is used, and the packages named as arguments. Where that needs
+# root and we are not, or where there is no apt, it says in one line what to install. It fails only
+# for venv: without the libraries `vpltune doctor` still runs, and says what is lost.
 set -eu
 : "${PYTHON:=python3}"
 
@@ -14,7 +14,7 @@ set -eu
 missing=""
 have() { [ "$(dpkg-query -W -f '${db:Status-Status}' "$1" 2>/dev/null)" = installed ]; }
 if command -v dpkg-query >/dev/null 2>&1; then
-    for package in libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri; do
+    for package in libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri "$@"; do
         have "$package" || missing="$missing $package"
     done
 fi
@@ -45,7 +45,7 @@ if [ "$(id -u)" -eq 0 ] && command -v apt-get >/dev/null 2>&1; then
         echo "setup: apt could not install:$missing" >&2
     }
 else
-    echo "setup: for OpenGL and Mitsuba run: sudo apt-get install$missing" >&2
+    echo "setup: not everything will work; run: sudo apt-get install$missing" >&2
 fi
 "$PYTHON" -c 'import ensurepip, venv' 2>/dev/null || {
     echo "setup: $PYTHON cannot make a virtual environment; run: sudo apt-get install python3-venv" >&2

@@ -34,6 +34,7 @@ from tuner.commands.report import (
     print_report,
     stdout_sent_to_stderr,
 )
+from tuner.commands.report_page import report
 
 PROGRAM = "vpltune"
 DEFECT = 1
@@ -46,7 +47,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (fit, batch, render, evaluate, export, doctor, bench):
+for command in (fit, batch, render, evaluate, export, report, doctor, bench):
     app.command()(command)
 
 

@@ -52,13 +52,20 @@ def hdr_flip(
     FLIP's exposures follow from the reference's brightest and median luminance, so both pictures are first
     divided by the reference's mean: the result depends on neither light units nor scale.
     """
+    return float(hdr_flip_map(picture, reference).mean(dtype=np.float64))
+
+
+def hdr_flip_map(
+    picture: Float[np.ndarray, "height width 3"], reference: Float[np.ndarray, "height width 3"]
+) -> Float[np.ndarray, "height width"]:
+    """HDR-FLIP of every pixel, in [0, 1]; see `hdr_flip`, its mean."""
     level = float(reference.mean(dtype=np.float64))
     if level <= 0.0:
-        return 0.0 if not picture.any() else 1.0
+        return np.full(picture.shape[:2], 1.0 if picture.any() else 0.0, np.float32)
     scaled = [np.ascontiguousarray(image / level, np.float32) for image in (reference, picture)]
     with np.errstate(all="ignore"):
-        _, mean, _ = flip_evaluator.evaluate(scaled[0], scaled[1], "HDR", applyMagma=False)
-    return float(mean)
+        errors, _, _ = flip_evaluator.evaluate(scaled[0], scaled[1], "HDR", applyMagma=False)
+    return errors[..., 0]
 
 
 def view_metrics(

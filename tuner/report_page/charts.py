@@ -1,0 +1,140 @@
+"""Drawings of a page, as numbers that templates/charts.html.j2 writes as SVG."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tuner.report_page.page_text import finite, number
+from tuner.report_page.scaled_axis import Axis, axis_around
+
+WIDTH, HEIGHT = 640, 300
+_LEFT, _RIGHT, _TOP, _BOTTOM = 66, 22, 14, 46
+
+Tick = tuple[float, str]
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A point that is named."""
+
+    x: float
+    y: float
+    kind: str
+    """Its colour: a variant's name, or `plain`."""
+    label: str = ""
+    anchor: str = "start"
+
+
+@dataclass(frozen=True)
+class LineChart:
+    """A line in a frame with ticks; `description` says in words what it shows."""
+
+    title: str
+    description: str
+    x_label: str
+    y_label: str
+    x_ticks: list[Tick]
+    y_ticks: list[Tick]
+    line: list[Point]
+    marks: list[Mark]
+    levels: list[tuple[float, str]]
+    """Heights of horizontal lines, and what they stand for."""
+
+
+@dataclass(frozen=True)
+class Bar:
+    label: str
+    share: float
+    """Of the chart's width, in [0, 1]."""
+    text: str
+
+
+def loss_chart(loss: Mapping[str, Any]) -> LineChart | None:
+    """The loss at every step of the descent; None where fewer than two are known."""
+    curve = loss.get("curve")
+    values = [finite(value) for value in curve] if isinstance(curve, list) else []
+    known = [(step, value) for step, value in enumerate(values) if value is not None]
+    if len(known) < 2:
+        return None
+    losses = [value for _, value in known]
+    scale = "log" if min(losses) > 0.0 and max(losses) > 3.0 * min(losses) else "linear"
+    x = Axis(0.0, float(len(values) - 1), _LEFT, WIDTH - _RIGHT)
+    if scale == "log":
+        y = axis_around(losses, HEIGHT - _BOTTOM, _TOP, "log")
+    else:
+        room = 0.1 * (max(losses) - min(losses)) or 1.0
+        y = Axis(min(losses) - room, max(losses) + room, HEIGHT - _BOTTOM, _TOP)
+    line = [(x.place(step), y.place(value)) for step, value in known]
+    best = min(known, key=lambda pair: pair[1])
+    marks = [
+        Mark(*line[0], "default", f"start {number(losses[0])}"),
+        Mark(x.place(best[0]), y.place(best[1]), "tuned", f"best {number(best[1])}", "end"),
+    ]
+    return LineChart(
+        "Loss at every step",
+        f"From {number(losses[0])} at the start to {number(best[1])} at step {best[0]} of {len(values) - 1}.",
+        "step",
+        "loss, log scale" if scale == "log" else "loss",
+        [(x.place(tick), number(tick)) for tick in x.ticks()],
+        [(y.place(tick), number(tick)) for tick in y.ticks()],
+        line,
+        marks,
+        [],
+    )
+
+
+def pareto_chart(front: Sequence[Mapping[str, Any]], ceiling: Any, budget: Any) -> LineChart | None:
+    """relMSE against milliseconds a frame; None where no point has both.
+
+    Args:
+        front: points with `milliseconds` and `relmse`.
+        ceiling: relMSE of the ceiling, drawn as a level, or None.
+        budget: milliseconds that were asked for, marked on the axis, or None.
+    """
+    points = sorted(
+        (milliseconds, error)
+        for point in front
+        if (milliseconds := finite(point.get("milliseconds"))) is not None
+        and (error := finite(point.get("relmse"))) is not None
+        and milliseconds > 0.0
+        and error > 0.0
+    )
+    if not points:
+        return None
+    times, errors = [time for time, _ in points], [error for _, error in points]
+    level = finite(ceiling)
+    shown = [*errors, level] if level is not None and level > 0.0 else errors
+    wanted = finite(budget)
+    x = axis_around(
+        [*times, wanted] if wanted is not None and wanted > 0.0 else times, _LEFT, WIDTH - _RIGHT, "log"
+    )
+    y = axis_around(shown, HEIGHT - _BOTTOM, _TOP, "log")
+    line = [(x.place(time), y.place(error)) for time, error in points]
+    marks = [Mark(*place, "tuned") for place in line]
+    if wanted is not None and wanted > 0.0:
+        marks.append(
+            Mark(x.place(wanted), HEIGHT - _BOTTOM, "budget", f"asked for {number(wanted)} ms", "middle")
+        )
+    return LineChart(
+        "Quality against milliseconds",
+        f"{len(points)} configs, from {number(times[0])} ms at relMSE {number(errors[0])} "
+        f"to {number(times[-1])} ms at relMSE {number(errors[-1])}.",
+        "milliseconds a frame, log scale",
+        "relMSE, log scale",
+        [(x.place(tick), number(tick)) for tick in x.ticks()],
+        [(y.place(tick), number(tick)) for tick in y.ticks()],
+        line,
+        marks,
+        [(y.place(level), "ceiling")] if level is not None and level > 0.0 else [],
+    )
+
+
+def bars(values: Mapping[str, Any], word: Any = number) -> list[Bar]:
+    """Bars of the numbers among `values`, in their order, the greatest as wide as the chart."""
+    known = {name: value for name, raw in values.items() if (value := finite(raw)) is not None}
+    greatest = max((abs(value) for value in known.values()), default=0.0)
+    return [
+        Bar(name.replace("_", " "), max(value, 0.0) / greatest if greatest else 0.0, word(value))
+        for name, value in known.items()
+    ]

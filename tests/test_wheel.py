@@ -3,7 +3,7 @@
 import subprocess
 import sys
 import zipfile
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import pytest
 
@@ -30,9 +30,9 @@ def test_every_source_and_data_file_is_in_the_wheel(wheel):
         path.relative_to(REPOSITORY).as_posix()
         for package in ("renderer", "tuner", "shaders", "configs")
         for path in (REPOSITORY / package).rglob("*")
-        if path.suffix in (".py", ".vert", ".frag", ".comp", ".glsl", ".json", ".glb")
+        if path.suffix in (".py", ".vert", ".frag", ".comp", ".glsl", ".json", ".glb", ".j2", ".css", ".js")
     }
-    assert any(name.endswith(".comp") for name in needed)
+    assert {".comp", ".j2"} <= {PurePosixPath(name).suffix for name in needed}
     with zipfile.ZipFile(wheel) as archive:
         assert needed <= set(archive.namelist())
 

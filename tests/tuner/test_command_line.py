@@ -21,7 +21,7 @@ from renderer.tuned_config import TunedConfig, read_config, write_config
 from tuner.__main__ import run
 from tuner.commands.options import Layer
 
-COMMANDS = ("fit", "batch", "render", "evaluate", "export", "doctor", "bench")
+COMMANDS = ("fit", "batch", "render", "evaluate", "export", "report", "doctor", "bench")
 REPOSITORY = Path(__file__).resolve().parent.parent.parent
 
 

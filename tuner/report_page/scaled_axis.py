@@ -19,7 +19,7 @@ class Axis:
     stop: float
     scale: Scale = "linear"
 
-    def place(self, value: float) -> float:
+    def place(self, value: float | int) -> float:
         """Where `value` stands; what lies outside stands at the end it is beyond."""
         low, high, value = (
             self._unit(v) for v in (self.low, self.high, min(max(value, self.low), self.high))
@@ -42,8 +42,8 @@ class Axis:
         inside = [value for value in candidates if self.low * (1 - 1e-9) <= value <= self.high * (1 + 1e-9)]
         return inside if len(inside) >= 2 else [self.low, self.high]
 
-    def _unit(self, value: float) -> float:
-        return math.log(value) if self.scale == "log" else value
+    def _unit(self, value: float | int) -> float:
+        return math.log(value) if self.scale == "log" else float(value)
 
 
 def axis_around(values: list[float], start: float, stop: float, scale: Scale = "linear") -> Axis:

@@ -89,7 +89,7 @@ def _views(fit: FitFolder) -> tuple[list[ViewBlock], str]:
         return shown, ""
     return (
         shown,
-        f"{missing} more views were measured: their figures are below, their pictures would make the page too large.",
+        f"{missing} more views were measured: with their pictures the page would be too large.",
     )
 
 

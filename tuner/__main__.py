@@ -23,6 +23,7 @@ from tuner.commands.doctor import doctor
 from tuner.commands.evaluate import evaluate
 from tuner.commands.export import export
 from tuner.commands.fit import fit
+from tuner.commands.import_scene import import_scene
 from tuner.commands.render import render
 from tuner.commands.report import (
     BAD_INPUT,
@@ -49,6 +50,8 @@ app = typer.Typer(
 )
 for command in (fit, batch, render, evaluate, export, report, doctor, bench):
     app.command()(command)
+# `import` is a word of Python's own.
+app.command("import")(import_scene)
 
 
 def main() -> None:

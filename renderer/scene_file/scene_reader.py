@@ -46,7 +46,7 @@ def read_scene(path: str | Path) -> Scene:
 def _reader_for(path: Path) -> Callable[[Path, Warnings], Scene]:
     suffix = path.suffix.lower()
     if suffix == ".xml":
-        raise SceneFileError(f"Mitsuba XML is not read; export the scene as one of {', '.join(_READERS)}")
+        raise SceneFileError("Mitsuba XML is not read; turn it into a .glb with `vpltune import`")
     if suffix not in _READERS:
         raise SceneFileError(f"a scene must be one of {', '.join(_READERS)}, got {suffix or 'no suffix'!r}")
     module, function = _READERS[suffix]

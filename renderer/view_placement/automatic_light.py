@@ -17,6 +17,7 @@ from renderer.view_placement.sight import (
     SAME_PLACE,
     Sight,
     light_hits,
+    march_from,
     mean_square_distance_world,
     seen_by,
 )
@@ -92,7 +93,7 @@ def _places_in_view(
     positions = index[:: max(1, -(-len(index) // (2 * PLACES)))] + 0.5
     offset = positions - eye
     distance = np.linalg.norm(offset, axis=1)
-    hits = march_rays(space, np.tile(eye, (len(positions), 1)), offset / np.maximum(distance, 1e-9)[:, None])
+    hits = march_from(space, eye, offset / np.maximum(distance, 1e-9)[:, None])
     in_sight = hits.distance > distance
     positions = positions[in_sight] if in_sight.any() else eye[None, :]
     fraction = height_fraction(space, positions)

@@ -17,6 +17,8 @@ MIDDLE_RAYS = np.arange(PICTURE[0] * PICTURE[1]).reshape(PICTURE[1], PICTURE[0])
 LIGHT_RAYS = 1024
 # Hits this many voxels apart are the same place: a marched distance is good to half a voxel at either end.
 SAME_PLACE = 1.8
+# How far rays are let go that start in a voxel with a surface in it.
+LEAVE_WALL = 1.8
 # The cosine between a ray and a voxel's mean normal above which it surely meets a back face.
 BACK_FACE = 0.05
 
@@ -55,9 +57,17 @@ def seen_by(space: FreeSpace, camera: Camera) -> Sight:
     """What a 4:3 picture of this camera shows."""
     directions = picture_directions(camera)
     origin = space.to_voxels(camera.position_world)
-    origins = np.tile(origin, (len(directions), 1))
-    hits = march_rays(space, origins, directions)
-    return Sight(hits, origins + np.where(hits.hit, hits.distance, 0.0)[:, None] * directions)
+    hits = march_from(space, origin, directions)
+    return Sight(hits, origin + np.where(hits.hit, hits.distance, 0.0)[:, None] * directions)
+
+
+def march_from(
+    space: FreeSpace, place: Float64[np.ndarray, "3"], directions: Float64[np.ndarray, "rays 3"]
+) -> RayHits:
+    """Rays of one eye or lamp; where it shares a voxel with a wall, they start beyond it."""
+    lead = LEAVE_WALL if space.clearance_at(place[None, :])[0] == 0.0 else 0.0
+    hits = march_rays(space, place + lead * directions, directions)
+    return RayHits(hits.hit, hits.distance + lead, hits.voxel)
 
 
 def front_facing(
@@ -102,21 +112,22 @@ def light_hits(space: FreeSpace, light: Light) -> RayHits:
         return march_rays(space, origins, np.tile(light.direction_world, (len(origins), 1)))
     outer = light.outer_cone if light.kind == "spot" else math.pi
     directions = cone_directions(light.direction_world, outer, LIGHT_RAYS)
-    origins = np.tile(space.to_voxels(light.position_world), (LIGHT_RAYS, 1))
-    return march_rays(space, origins, directions)
+    return march_from(space, space.to_voxels(light.position_world), directions)
 
 
 def lit(space: FreeSpace, light: Light, points: Float64[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
     """Which surface points (voxel units, within half a voxel) direct light of this light reaches."""
     if light.kind == "directional":
         # Marched from outside the grid, so that a point need not be left first.
-        size = 2.0 * float(np.linalg.norm(space.shape))
-        offset = np.tile(-size * light.direction_world, (len(points), 1))
+        distance = np.full(len(points), 2.0 * float(np.linalg.norm(space.shape)))
+        towards = np.tile(light.direction_world, (len(points), 1))
+        hits = march_rays(space, points - distance[:, None] * towards, towards)
     else:
-        offset = space.to_voxels(light.position_world) - points
-    distance = np.linalg.norm(offset, axis=1)
-    towards = -offset / np.maximum(distance, 1e-9)[:, None]
-    hits = march_rays(space, points + offset, towards)
+        place = space.to_voxels(light.position_world)
+        offset = points - place
+        distance = np.linalg.norm(offset, axis=1)
+        towards = offset / np.maximum(distance, 1e-9)[:, None]
+        hits = march_from(space, place, towards)
     reached = hits.distance >= distance - SAME_PLACE
     if light.kind == "spot":
         reached &= towards @ light.direction_world > math.cos(light.outer_cone)

@@ -146,7 +146,7 @@ def test_other_formats_are_refused_with_the_list_of_ours(tmp_path, name):
 
 
 def test_mitsuba_xml_is_refused_by_name(tmp_path):
-    with pytest.raises(InputError, match="Mitsuba XML is not read"):
+    with pytest.raises(InputError, match="Mitsuba XML is not read; turn it into a .glb"):
         read_scene(tmp_path / "scene.xml")
 
 

@@ -18,6 +18,7 @@ from tuner.library.record import Record, Records
 from tuner.library.scene_files import library_scenes
 from tuner.library.sweep import sweep
 from tuner.library.tensorboard_log import fit_curves
+from tuner.reference.cache import remove_leftovers
 
 Event = dict[str, Any]
 Scheduler = Callable[[Sequence[Job]], Iterator[Event]]
@@ -91,6 +92,7 @@ def run_batch(
     waiting = longest_first([job for job in found.jobs if job.key not in known])
     watcher.found(waiting, len(found.jobs) - len(waiting))
     if waiting:
+        remove_leftovers()
         with BatchLog(folder / "log.jsonl") as log, fit_curves(folder, tensorboard) as draw_curves:
             _run(waiting, scheduler, watcher, log, draw_curves)
     made = [record for job in found.jobs if (record := records.read(job.key)) is not None]

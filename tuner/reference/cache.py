@@ -88,16 +88,33 @@ def locked(key: str) -> Iterator[None]:
         os.close(handle)
 
 
-def _lock(path: Path) -> int | None:
-    """An open file that holds the lock; None where the folder cannot be written to."""
+def remove_leftovers() -> None:
+    """Remove what killed processes left in the folder: locks that nobody holds, files half written."""
+    folder = _path("").parent
+    for path in [*folder.glob("*.lock"), *folder.glob(f".*{_SUFFIX}")]:
+        key = path.stem.removeprefix(".").partition("-")[0]
+        handle = _lock(_path(key).with_suffix(".lock"), wait=False)
+        if handle is not None:
+            path.unlink(missing_ok=True)
+            _path(key).with_suffix(".lock").unlink(missing_ok=True)
+            os.close(handle)
+
+
+def _lock(path: Path, wait: bool = True) -> int | None:
+    """An open file that holds the lock; None where none can be had, or another process has it."""
     while True:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         except OSError:
             return None
-        with contextlib.suppress(OSError):  # some network file systems cannot lock
-            fcntl.flock(handle, fcntl.LOCK_EX)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(handle)
+            return None
+        except OSError:
+            pass  # some network file systems cannot lock
         # A lock on a file that its last holder unlinked keeps nobody off.
         with contextlib.suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(handle), path.stat()):

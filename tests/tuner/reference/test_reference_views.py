@@ -310,3 +310,20 @@ def test_a_lock_that_was_unlinked_under_a_waiting_process_keeps_others_off(monke
     third.join()
     assert order == ["second", "second out", "third"]
     assert list((tmp_path / "references").iterdir()) == []
+
+
+def test_leftovers_go_and_what_is_in_use_stays(monkeypatch, tmp_path):
+    no_cache(monkeypatch, tmp_path)
+    folder = tmp_path / "references"
+    folder.mkdir()
+    for name in ("dead.lock", ".dead-x1.reference", ".busy-x1.reference", "kept.reference"):
+        (folder / name).touch()
+    with cache.locked("busy"):
+        cache.remove_leftovers()
+        assert {path.name for path in folder.iterdir()} == {
+            "busy.lock",
+            ".busy-x1.reference",
+            "kept.reference",
+        }
+    cache.remove_leftovers()
+    assert [path.name for path in folder.iterdir()] == ["kept.reference"]

@@ -72,7 +72,7 @@ def descend(
     squares = [np.asarray(state.at_point.squares)[None]]
     start_squares = float(squares[0][0])
     status = FitStatus.STEP_LIMIT if np.isfinite(start_squares) else FitStatus.NOT_FINITE
-    blocks = -(-steps // BLOCK) if np.isfinite(start_squares) else 0
+    blocks = -(-steps // BLOCK) if np.isfinite(start_squares) and point.size else 0
     for block in range(blocks):
         state, trace = _block(residuals, state, data)
         squares.append(np.asarray(trace))
@@ -82,7 +82,7 @@ def descend(
             status = FitStatus.CONVERGED
             break
     losses = np.concatenate(squares).astype(np.float64) + offset
-    if blocks and not losses[-1] < losses[0]:
+    if status is not FitStatus.NOT_FINITE and not losses[-1] < losses[0]:
         status = FitStatus.NO_IMPROVEMENT
     return Descent(np.asarray(state.point), float(losses[-1]), float(losses[0]), losses, status)
 

@@ -14,21 +14,16 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
-from tuner.binned_gather import bin_vpls
 from tuner.captured_view import CapturedView
 from tuner.descent import STEPS, Residuals, descend
 from tuner.fit_status import Descent, FitStatus
-from tuner.losses.relative_squared_error import EVEN_SHARE, target_of
-from tuner.reduced_gather import ReducedGather, reduce_gather, reduced_picture
+from tuner.fit_views import FitView, fit_view_of
+from tuner.losses.relative_squared_error import EVEN_SHARE
+from tuner.reduced_gather import ReducedGather, reduced_picture
 from tuner.search_space import SearchSpace
-from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_gather import FalloffParameters
-from tuner.vpl_visibility import map_visibility
 
 Data = tuple[ReducedGather, ...]
-
-RECEIVERS_PER_VIEW = 4096
-"""Pixels of each view that the fit looks at: three parameters need no more, and memory stays bounded."""
 
 _INTENSITY = next(spec for spec in ARTIST_PARAMETERS if spec.name == "intensity")
 
@@ -54,29 +49,65 @@ def fit_falloff(
         even_share: weight of plain squared error beside relMSE, see `tuner.losses`.
         progress: called with the share done, in [0, 1].
     """
-    data = tuple(
-        _reduced_view(
-            view, seed + index, even_share, start, None if visibility is None else visibility[index]
+    return fit_to(
+        fit_views(views, start, seed=seed, visibility=visibility, even_share=even_share),
+        start,
+        steps=steps,
+        progress=progress,
+    )
+
+
+def fit_views(
+    views: tuple[CapturedView, ...],
+    start: ArtistParameters,
+    *,
+    seed: int = 0,
+    visibility: tuple[Bool[np.ndarray, "receivers vpls"], ...] | None = None,
+    even_share: float = EVEN_SHARE,
+) -> tuple[FitView, ...]:
+    """The views ready to be fitted; arguments as those of `fit_falloff`."""
+    return tuple(
+        fit_view_of(
+            view,
+            start,
+            None if visibility is None else visibility[index],
+            seed=seed + index,
+            even_share=even_share,
         )
         for index, view in enumerate(views)
     )
+
+
+def fit_to(
+    views: tuple[FitView, ...],
+    start: ArtistParameters,
+    *,
+    held: frozenset[str] = frozenset(),
+    steps: int = STEPS,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[ArtistParameters, Descent]:
+    """Fit to views that are ready for it; the parameters in `held` stay at the start's, k never does.
+
+    The descent moves over all parameters but k, and is reported as if it had moved over all of them.
+    """
+    data = tuple(view.reduced for view in views)
     if not any(jnp.any(view.factor != 0.0) for view in data):
         point = SearchSpace().point(start)
         return start, Descent(point, np.nan, np.nan, np.array([np.nan]), FitStatus.NOTHING_LIT)
-    return _fit(data, start, steps, progress)
-
-
-def _fit(
-    data: Data, start: ArtistParameters, steps: int, progress: Callable[[float], None] | None
-) -> tuple[ArtistParameters, Descent]:
-    """Moves over all parameters but k, and reports as if it had moved over all of them."""
     offset = float(sum(view.offset for view in data)) / len(data)
     start_loss = float(_squares(FalloffParameters.of(start), data)) + offset
-    others = SearchSpace(tuple(spec for spec in SearchSpace().specs if spec is not _INTENSITY))
-    found = descend(
-        _residuals(others), data, others.point(start), offset=offset, steps=steps, progress=progress
+    moved = SearchSpace(
+        tuple(spec for spec in SearchSpace().specs if spec is not _INTENSITY and spec.name not in held)
     )
-    tuned = others.parameters(found.point, start)
+    found = descend(
+        _residuals(moved),
+        (data, FalloffParameters.of(start)),
+        moved.point(start),
+        offset=offset,
+        steps=steps,
+        progress=progress,
+    )
+    tuned = moved.parameters(found.point, start)
     tuned = replace(tuned, intensity=float(_best_intensity(FalloffParameters.of(tuned), data)))
     status = found.status
     if not found.loss < start_loss:
@@ -86,27 +117,7 @@ def _fit(
         # The closed form alone has done it.
         status = FitStatus.CONVERGED
     losses = np.concatenate([[start_loss], found.losses])
-    descent = Descent(SearchSpace().point(tuned), min(found.loss, start_loss), start_loss, losses, status)
-    return tuned, descent
-
-
-def _reduced_view(
-    view: CapturedView,
-    seed: int,
-    even_share: float,
-    parameters: ArtistParameters,
-    visibility: Bool[np.ndarray, "receivers vpls"] | None,
-) -> ReducedGather:
-    pixels = view.fitted_pixels(RECEIVERS_PER_VIEW, seed)
-    receivers, vpls = gather_inputs(view.captured, pixels)
-    if visibility is None:
-        seen = map_visibility(view.captured, receivers, vpls, parameters)
-    else:
-        seen = visibility[pixels]
-    flat = np.flatnonzero(view.captured.valid.ravel())[pixels]
-    halves = (view.reference.irradiance_a, view.reference.irradiance_b)
-    target = target_of(*(half.reshape(-1, 3)[flat] for half in halves), even_share)
-    return reduce_gather(bin_vpls(receivers, vpls, seen), target)
+    return tuned, Descent(SearchSpace().point(tuned), min(found.loss, start_loss), start_loss, losses, status)
 
 
 def _pictures_and_targets(falloff: FalloffParameters, data: Data) -> tuple[Array, Array]:
@@ -136,8 +147,11 @@ def _squares(falloff: FalloffParameters, data: Data) -> Float[Array, ""]:
 @lru_cache
 def _residuals(space: SearchSpace) -> Residuals:
     # One function object for each space: the compiled fit is found again by it.
-    def residuals(point: Float[Array, "parameters"], data: Data) -> Array:
-        falloff = FalloffParameters(intensity=jnp.ones(()), **space.values(point))
+    def residuals(
+        point: Float[Array, "parameters"], given: tuple[Data, FalloffParameters]
+    ) -> Float[Array, "rows"]:
+        data, rest = given
+        falloff = replace(rest, intensity=jnp.ones(()), **space.values(point))
         pictures, targets = _pictures_and_targets(falloff, data)
         return (_projected(pictures, targets) * pictures - targets) / np.sqrt(len(data))
 

@@ -2,7 +2,7 @@
 
 import importlib.metadata
 import platform
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,11 @@ from renderer.tuned_config import TunedConfig, read_config, write_config
 from renderer.views import write_views
 from tuner.comparison_picture import write_comparison
 from tuner.evaluate import SPLITS, EvaluatedView, Evaluation, evaluate
-from tuner.fit_falloff import fit_falloff
+from tuner.fit_falloff import fit_views
 from tuner.fit_status import Descent
 from tuner.prepare_scene import PreparedScene, Progress, SceneOptions, Stopwatch, prepare_scene
 from tuner.reference.content_key import scene_digest
+from tuner.uncertainty import fit_with_intervals
 from tuner.view_pictures import write_view_pictures
 
 PANEL_HEIGHT = 240
@@ -88,10 +89,9 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
     prepared = prepare_scene(scene_path, options, options.start, watch, progress)
     fitted = tuple(view for view in prepared.views if view.view.split == "fitted")
     with watch.stage("fit"):
-        tuned, descent = fit_falloff(
-            fitted,
+        tuned, descent, intervals = fit_with_intervals(
+            fit_views(fitted, options.start.parameters, seed=options.seed),
             options.start.parameters,
-            seed=options.seed,
             progress=lambda share: progress("fit", share),
         )
     with watch.stage("evaluate"):
@@ -126,6 +126,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
             "steps": len(descent.losses) - 1,
             "curve": descent.losses.tolist(),
         },
+        "uncertainty": {name: asdict(interval) for name, interval in intervals.items()},
         "ceiling_parameters": evaluation.ceiling_parameters.as_dict(),
         "per_view": evaluation.per_view(),
         "notes": list(prepared.notes),

@@ -46,7 +46,7 @@ def test_the_metrics_table_shows_every_number():
 
 
 def test_the_parameters_table_has_values_defaults_and_units():
-    text = text_of(parameters_table(ArtistParameters(intensity=1.5).as_dict()))
+    text = text_of(parameters_table(ArtistParameters(intensity=1.5).as_dict(), {}))
     assert "1.5" in text
     assert "VPL footprints" in text
     assert "k  intensity" in text

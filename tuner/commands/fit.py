@@ -97,7 +97,7 @@ def _report(document: dict, output: Path) -> Report:
     config, picture = output / "tuned.json", output / "tuned.png"
     command = ["vpltune", "render", document["scene"], "--config", str(config), "-o", str(picture)]
     shown = (
-        parameters_table(document["parameters"]),
+        parameters_table(document["parameters"], document["uncertainty"]),
         metrics_table(document["metrics"]),
         f"{escape(document['sentence'])} ({document['seconds']['total']:.1f} s)",
         f"picture: {escape(str(output / 'comparison.png'))}",

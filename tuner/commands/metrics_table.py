@@ -30,18 +30,42 @@ def metrics_table(metrics: Mapping[str, Any]) -> Any:
     return table
 
 
-def parameters_table(parameters: Mapping[str, float | int]) -> Any:
-    """A rich table of the parameters, their defaults and units."""
+def parameters_table(
+    parameters: Mapping[str, float | int], uncertainty: Mapping[str, Mapping[str, Any]]
+) -> Any:
+    """A rich table of the parameters, how sure they are, their defaults and units."""
     from rich.table import Table
 
     table = Table(title="Parameters", title_justify="left")
     table.add_column("", no_wrap=True)
-    for heading, justify in (("value", "right"), ("default", "right"), ("unit", "left")):
-        table.add_column(heading, justify=justify)
+    for heading, justify, no_wrap in (
+        ("value", "right", True),
+        ("90 % interval", "right", True),
+        ("trades\nwith", "left", False),
+        ("default", "right", True),
+        ("unit", "left", False),
+    ):
+        table.add_column(heading, justify=justify, no_wrap=no_wrap)
     for spec in ARTIST_PARAMETERS:
-        row = (f"{parameters[spec.name]:.4g}", f"{spec.default:.4g}", spec.unit)
-        table.add_row(f"{spec.symbol}  {spec.name}", *row, style="bold" if spec.fitted else "dim")
+        table.add_row(
+            f"{spec.symbol}  {spec.name}",
+            f"{parameters[spec.name]:.4g}",
+            *_sureness(uncertainty.get(spec.name)),
+            f"{spec.default:.4g}",
+            spec.unit,
+            style="bold" if spec.fitted else "dim",
+        )
     return table
+
+
+def _sureness(interval: Mapping[str, Any] | None) -> tuple[str, str]:
+    if interval is None:
+        return "", ""
+    symbols = {spec.name: spec.symbol for spec in ARTIST_PARAMETERS}
+    ends = f"{interval['low']:.3g} to {interval['high']:.3g}"
+    if not interval["determined"]:
+        ends += "\nnot determined"
+    return ends, ", ".join(symbols[name] for name in interval["trades_with"])
 
 
 def _number(value: Any) -> str:

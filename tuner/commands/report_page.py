@@ -6,20 +6,29 @@ from typing import Annotated
 import typer
 
 from tuner.commands.options import JsonOption
-from tuner.commands.report import Report
+from tuner.commands.report import OK, PARTLY_DONE, Report, warn
 
 
 def report(
     folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="A folder that `fit` made.", show_default=False)
+        Path, typer.Argument(metavar="DIR", help="A folder that `fit` or `batch` made.", show_default=False)
     ],
     json: JsonOption = False,
 ) -> Report:
-    """Write DIR/report.html: pictures before and after, error maps, parameters, timings, in one file."""
+    """Write a page to look at: DIR/report.html for a fit; for a batch, DIR/index.html and one a scene."""
     from rich.markup import escape
 
+    from tuner.commands.progress_display import shown_progress
     from tuner.report_page.write_report import write_report
 
-    pages = write_report(folder)
-    document = {"pages": [str(page) for page in pages], "status": "ok"}
-    return Report(document, tuple(f"wrote {escape(str(page))}" for page in pages))
+    with shown_progress() as progress:
+        written = write_report(folder, lambda share: progress("pages", share))
+    warn(written.problems)
+    first, *others = written.pages
+    document = {
+        "pages": [str(page) for page in written.pages],
+        "problems": list(written.problems),
+        "status": "partly done" if written.problems else "ok",
+    }
+    shown = (f"wrote {escape(str(first))}" + (f" and {len(others)} pages of scenes" if others else ""),)
+    return Report(document, shown, PARTLY_DONE if written.problems else OK)

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from tuner.report_page.page_text import finite, number
-from tuner.report_page.scaled_axis import Axis, axis_around
+from tuner.report_page.scaled_axis import Axis, Tick, axis_around
 
 WIDTH, HEIGHT = 640.0, 300.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 66.0, 22.0, 14.0, 46.0
 
-Tick = tuple[float, str]
 Point = tuple[float, float]
 
 

@@ -46,7 +46,8 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["number"] = page_text.number
+    for words in (page_text.number, page_text.seconds, page_text.ratio):
+        environment.filters[words.__name__] = words
     return environment
 
 

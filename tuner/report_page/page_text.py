@@ -54,3 +54,11 @@ def change(before: Any, after: Any) -> str:
     if new > 2.0 * old:
         return f"{new / old:.1f} times as much"
     return f"{abs(percent):.0f} % {'less' if percent < 0.0 else 'more'}"
+
+
+def ratio(value: Any) -> str:
+    """A ratio as the change that it is."""
+    known = finite(value)
+    if known is None:
+        return NONE
+    return f"×{known:.2f}" if known >= 2.0 else f"{100.0 * (known - 1.0):+.0f} %".replace("-", "−")

@@ -5,6 +5,9 @@ from dataclasses import dataclass
 
 from renderer.artist_parameters import Scale
 
+Tick = tuple[float, str]
+"""Where a tick stands, and its label."""
+
 
 @dataclass(frozen=True)
 class Axis:

@@ -49,7 +49,7 @@ def view_block(pictures: ViewPictures, measured: dict[str, Any]) -> ViewBlock:
     """Everything a page shows of one view. `measured` is its entry in `per_view`."""
     valid, reference = pictures.valid, pictures.radiance("reference")
     exposures = {
-        "picture": _exposure(reference, valid),
+        "picture": picture_exposure(pictures),
         "irradiance": _exposure(pictures.indirect["reference"], valid),
     }
     signed = {
@@ -116,6 +116,11 @@ def png_address(picture: np.ndarray) -> str:
 def data_address(png: bytes) -> str:
     """A PNG file as a data: address."""
     return f"data:image/png;base64,{base64.b64encode(png).decode('ascii')}"
+
+
+def picture_exposure(pictures: ViewPictures) -> float:
+    """What a whole picture of the view is multiplied by before the tone curve, in every variant."""
+    return _exposure(pictures.radiance("reference"), pictures.valid)
 
 
 def _exposure(linear: np.ndarray, valid: np.ndarray) -> float:

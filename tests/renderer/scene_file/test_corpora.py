@@ -41,7 +41,6 @@ for name in json.load(sys.stdin):
     except InputError as error:
         outcome |= {"triangles": 0, "refusal": str(error)}
     outcome["seconds"] = time.perf_counter() - start
-    outcome["peak_mib"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss >> 10
     folder = str(path.parent.resolve())
     # Python's own modules, loaded when first needed, are not the file's doing.
     outcome["opened_outside"] = [
@@ -49,6 +48,9 @@ for name in json.load(sys.stdin):
         if not os.path.realpath(name).startswith(folder + os.sep)
         and not name.endswith((".py", ".pyc", ".so"))
     ]
+    # Of this process alone: ru_maxrss starts at what the parent had when it made this one.
+    status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
+    outcome["peak_mib"] = int(status["VmHWM"].split()[0]) >> 10
     print(json.dumps(outcome))
 """
 

@@ -104,6 +104,10 @@ REFUSED = {
         ["batch", ".", "-o", "out", "--memory-limit", "4T"],
         "--memory-limit: must be like 900M or 4G, got '4T'",
     ),
+    "two schedulers": (
+        ["batch", ".", "-o", "out", "--scheduler", "tcp://a:1", "--slurm", ""],
+        "--scheduler and --slurm: only one",
+    ),
     "no scenes": (["batch", ".", "-o", "out"], "has no .gltf, .glb, .obj, .ply, .xml file below it"),
     "no benchmark": (["bench", "cooking"], "bench: NAME must be one of .*, got 'cooking'"),
 }

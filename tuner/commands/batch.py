@@ -22,8 +22,11 @@ from tuner.commands.report import OK, PARTLY_DONE, Report
 
 if TYPE_CHECKING:
     from tuner.library.batch import BatchResult, Scheduler
+    from tuner.library.supervised_process import Limits
 
 RUN_PANEL = "How it is run"
+SLURM_TASKS = 64
+"""Of an array, where `--workers` is not given."""
 MEMORY_UNITS = {"M": 2**20, "G": 2**30}
 
 
@@ -89,6 +92,24 @@ def batch(
             rich_help_panel=RUN_PANEL,
         ),
     ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Run on the workers of a Dask scheduler, tcp://….",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
+        ),
+    ] = None,
+    slurm: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KEY=VALUE,…",
+            help="Run as an array of Slurm tasks; submitit's parameters, as partition=cpu,timeout_min=240.",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
+        ),
+    ] = None,
     tensorboard: Annotated[
         bool, typer.Option(help="Write loss curves for TensorBoard too.", rich_help_panel=RUN_PANEL)
     ] = False,
@@ -108,15 +129,19 @@ def batch(
         bounces=bounces,
         size=None if size is None else parse_size(size),
     )
+    if scheduler is not None and slurm is not None:
+        raise InputError("--scheduler and --slurm: only one of them can be given")
+    elsewhere = scheduler is not None or slurm is not None
     cores = len(os.sched_getaffinity(0))
-    count = workers or max(1, cores // threads)
-    scheduler = _local(count, threads, time_limit, memory_limit, retries)
+    count = workers or (SLURM_TASKS if slurm is not None else max(1, cores // threads))
+    limits = _limits(time_limit, memory_limit, retries, None if elsewhere else count)
+    tasks = None if slurm is None else parse_slurm(slurm)
     with shown_batch(count) as watcher:
         result = run_batch(
             library,
             output,
             options,
-            scheduler,
+            _scheduler(scheduler, tasks, count, threads, limits),
             watcher,
             retry_failed=retry_failed,
             tensorboard=tensorboard,
@@ -125,16 +150,48 @@ def batch(
     return _report(result, output)
 
 
-def _local(
-    workers: int, threads: int, time_limit: float, memory_limit: str | None, retries: int
-) -> "Scheduler":
-    from tuner.library.local_scheduler import tune_locally
-    from tuner.library.supervised_process import Limits, machine_memory_bytes
+def _limits(time_limit: float, memory_limit: str | None, retries: int, sharing: int | None) -> "Limits":
+    """`sharing`: how many scenes share this machine's memory; None where they run elsewhere."""
+    from tuner.library.supervised_process import UNLIMITED_BYTES, Limits, machine_memory_bytes
 
     if not time_limit > 0.0:
         raise InputError(f"--time-limit: must be a number of seconds above 0, got {time_limit}")
-    memory = machine_memory_bytes() // workers if memory_limit is None else parse_memory(memory_limit)
-    return partial(tune_locally, workers=workers, threads=threads, limits=Limits(time_limit, memory, retries))
+    if memory_limit is not None:
+        memory = parse_memory(memory_limit)
+    else:
+        memory = UNLIMITED_BYTES if sharing is None else machine_memory_bytes() // sharing
+    return Limits(time_limit, memory, retries)
+
+
+def _scheduler(
+    address: str | None, slurm: dict[str, str | int] | None, workers: int, threads: int, limits: "Limits"
+) -> "Scheduler":
+    if address is not None:
+        from tuner.library.dask_scheduler import tune_on_dask
+
+        return partial(tune_on_dask, address=address, threads=threads, limits=limits)
+    if slurm is not None:
+        from tuner.library.slurm_scheduler import tune_on_slurm
+
+        return partial(tune_on_slurm, options=slurm, workers=workers, threads=threads, limits=limits)
+    from tuner.library.local_scheduler import tune_locally
+
+    return partial(tune_locally, workers=workers, threads=threads, limits=limits)
+
+
+def parse_slurm(text: str) -> dict[str, str | int]:
+    """Parameters from "partition=cpu,timeout_min=240"; none from "".
+
+    Raises:
+        InputError: a part is not KEY=VALUE.
+    """
+    parameters: dict[str, str | int] = {}
+    for part in filter(None, text.split(",")):
+        key, equals, value = part.partition("=")
+        if not (key and equals):
+            raise InputError(f"--slurm: must be KEY=VALUE parted by commas, got {part!r:.60}")
+        parameters[key] = int(value) if value.isdecimal() else value
+    return parameters
 
 
 def parse_memory(text: str) -> int:

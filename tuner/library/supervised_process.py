@@ -26,9 +26,12 @@ START_SECONDS = 300.0
 """For Python and its libraries to load: three on a quiet machine."""
 LOOK_SECONDS = 0.2
 """Between two looks at the clock and at the memory of the process."""
+UNLIMITED_BYTES = 2**62
 RENEWED_SHARE = 0.5
 """Of the memory limit, above which a process is replaced before its next scene: libraries keep what they
 compiled, and their caches must not be charged to a scene that comes late."""
+RENEWED_BYTES = 4 * 2**30
+"""The same, where the limit is large."""
 
 Progress = Callable[[str, float], None]
 
@@ -76,7 +79,7 @@ class SupervisedProcess:
             MachineError: this machine cannot fit anything.
             StoppedError: `stopped` was set.
         """
-        self._renew_if_large(limits)
+        self._renew_if_large_or_gone(limits)
         started = time.perf_counter()
         try:
             if self._process is None:
@@ -151,10 +154,14 @@ class SupervisedProcess:
                         f"{memory_bytes / 2**20:.0f} MiB"
                     )
 
-    def _renew_if_large(self, limits: Limits) -> None:
+    def _renew_if_large_or_gone(self, limits: Limits) -> None:
         if self._process is not None:
+            if self._process.poll() is not None:
+                self.close()  # it had nothing to do for long
+                return
             with contextlib.suppress(psutil.Error):
-                if memory_of(psutil.Process(self._process.pid)) > RENEWED_SHARE * limits.memory_bytes:
+                most = min(RENEWED_SHARE * limits.memory_bytes, RENEWED_BYTES)
+                if memory_of(psutil.Process(self._process.pid)) > most:
                     self.close()
 
     def _cause_of_death(self) -> str:

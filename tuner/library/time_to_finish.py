@@ -14,6 +14,9 @@ FIRST_GUESS_SECONDS_PER_MIB = 0.5
 DEVIATIONS = 1.9
 """Standard deviations that a forecast spans to each side: the truth lies in it four times in five or more."""
 
+LEAST_SCENES = 3
+"""Done, before anything is said: two can be alike by chance."""
+
 
 @dataclass
 class SceneSeconds:
@@ -110,7 +113,9 @@ class Forecast:
     def happened(self, event: dict[str, Any], now: float) -> None:
         """A scheduler's event, seen at `now`."""
         key = event.get("key", "")
-        if event["event"] == "scene_started" and key in self._waiting:
+        if event["event"] == "workers":
+            self._workers = max(1, event["count"])
+        elif event["event"] == "scene_started" and key in self._waiting:
             self._running[key] = (self._waiting.pop(key), now)
         elif event["event"] == "record":
             self.done += 1
@@ -120,8 +125,8 @@ class Forecast:
                 self._model.add(size, event["seconds"] * event["attempts"])
 
     def seconds_left(self, now: float) -> tuple[float, float] | None:
-        """Low and high estimate; None before two scenes were fitted."""
-        if len(self._model.seconds_done) < 2:
+        """Low and high estimate; None before three scenes were fitted."""
+        if len(self._model.seconds_done) < LEAST_SCENES:
             return None
         running = [(size, now - since) for size, since in self._running.values()]
         return seconds_left(self._model, self._waiting.values(), running, self._workers)

@@ -19,9 +19,12 @@ from tuner.library.messages import receive, send
 from tuner.library.record import as_document
 from tuner.library.tune_one import tune_one
 
+IDLE_SECONDS = 120.0
+"""Without a job, after which it ends: a cluster's worker stays when a batch is over, and memory is dear."""
+
 
 def main(handle: int) -> None:
-    """Serve until the parent closes the socket, or dies."""
+    """Serve until no job comes, or the parent closes the socket or dies."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
     threading.Thread(target=_die_with_parent, daemon=True).start()
     import tuner.fit_scene  # noqa: F401  before the first job, whose time is limited
@@ -29,7 +32,7 @@ def main(handle: int) -> None:
     connection = Connection(handle)
     with contextlib.suppress(EOFError, OSError):
         send(connection, {"ready": True})
-        while True:
+        while connection.poll(IDLE_SECONDS):
             order = receive(connection)
             send(connection, _outcome(connection, Job.from_json(order["job"]), order["attempt"]))
 

@@ -34,10 +34,11 @@ def test_scenes_alike_are_forecast_to_a_tenth(make_job):
     assert forecast.seconds_left(25.0) == pytest.approx((27.5, 27.5), rel=0.1)
 
 
-def test_nothing_is_said_before_two_scenes_were_fitted(make_job):
+def test_nothing_is_said_before_three_scenes_were_fitted(make_job):
     forecast, jobs = forecast_of(make_job, [5] * 4, workers=1)
     finish(forecast, jobs[0], 1.0, seconds=0.0, status="refused")
     finish(forecast, jobs[1], 2.0, seconds=3.0)
+    finish(forecast, jobs[2], 3.0, seconds=3.0)
     assert forecast.seconds_left(2.0) is None
     assert time_left(forecast) == ""
 

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -233,5 +234,6 @@ def _report(result: "BatchResult", output: Path) -> Report:
         *((table,) if troubled else ()),
         f"{sentence}; {result.fitted} of them in this run",
         f"records: {escape(str(output / 'records'))}",
+        f"report:  {escape(shlex.join(('vpltune', 'report', str(output))))}",
     )
     return Report(document, shown, PARTLY_DONE if troubled else OK)

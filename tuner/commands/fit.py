@@ -102,5 +102,6 @@ def _report(document: dict, output: Path) -> Report:
         f"{escape(document['sentence'])} ({document['seconds']['total']:.1f} s)",
         f"picture: {escape(str(output / 'comparison.png'))}",
         f"next:    {escape(shlex.join(command))}",
+        f"report:  {escape(shlex.join(('vpltune', 'report', str(output))))}",
     )
     return Report(document, shown, OK if document["status"] == "ok" else PARTLY_DONE)

@@ -1,14 +1,16 @@
 """Drawings of a page, as numbers that templates/charts.html.j2 writes as SVG."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tuner.report_page.page_text import finite, number
+from tuner.report_page.page_text import finite, number, words
 from tuner.report_page.scaled_axis import Axis, Tick, axis_around
 
 WIDTH, HEIGHT = 640.0, 300.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 66.0, 22.0, 14.0, 46.0
+
+MOST_DOTS = 40
 
 Point = tuple[float, float]
 
@@ -37,6 +39,8 @@ class LineChart:
     y_ticks: list[Tick]
     line: list[Point]
     marks: list[Mark]
+    dotted: bool
+    """Whether each value gets a dot: only where there is room for them."""
     levels: list[tuple[float, str]]
     """Heights of horizontal lines, and what they stand for."""
 
@@ -79,6 +83,7 @@ def loss_chart(loss: Mapping[str, Any]) -> LineChart | None:
         [(y.place(tick), number(tick)) for tick in y.ticks()],
         line,
         marks,
+        len(line) <= MOST_DOTS,
         [],
     )
 
@@ -110,7 +115,7 @@ def pareto_chart(front: Sequence[Mapping[str, Any]], ceiling: Any, budget: Any) 
     )
     y = axis_around(shown, HEIGHT - _BOTTOM, _TOP, "log")
     line = [(x.place(time), y.place(error)) for time, error in points]
-    marks = [Mark(*place, "tuned") for place in line]
+    marks = []
     if wanted is not None and wanted > 0.0:
         marks.append(
             Mark(x.place(wanted), HEIGHT - _BOTTOM, "budget", f"asked for {number(wanted)} ms", "middle")
@@ -125,15 +130,16 @@ def pareto_chart(front: Sequence[Mapping[str, Any]], ceiling: Any, budget: Any) 
         [(y.place(tick), number(tick)) for tick in y.ticks()],
         line,
         marks,
+        True,
         [(y.place(level), "ceiling")] if level is not None and level > 0.0 else [],
     )
 
 
-def bars(values: Mapping[str, Any], word: Any = number) -> list[Bar]:
+def bars(values: Mapping[str, Any], word: Callable[[Any], str] = number) -> list[Bar]:
     """Bars of the numbers among `values`, in their order, the greatest as wide as the chart."""
     known = {name: value for name, raw in values.items() if (value := finite(raw)) is not None}
     greatest = max((abs(value) for value in known.values()), default=0.0)
     return [
-        Bar(name.replace("_", " "), max(value, 0.0) / greatest if greatest else 0.0, word(value))
+        Bar(words(name), max(value, 0.0) / greatest if greatest else 0.0, word(value))
         for name, value in known.items()
     ]

@@ -46,8 +46,8 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    for words in (page_text.number, page_text.seconds, page_text.ratio):
-        environment.filters[words.__name__] = words
+    for wording in (page_text.number, page_text.seconds, page_text.ratio, page_text.words):
+        environment.filters[wording.__name__] = wording
     return environment
 
 

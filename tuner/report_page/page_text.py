@@ -18,6 +18,12 @@ def finite(value: Any) -> float | None:
     return number if math.isfinite(number) else None
 
 
+def words(name: str) -> str:
+    """A key of a file as one would write it."""
+    spoken = {"vpl": "VPL", "vpls": "VPLs", "n": "N", "sha256": "SHA-256", "jax": "JAX", "opengl": "OpenGL"}
+    return " ".join(spoken.get(word, word) for word in name.split("_"))
+
+
 def number(value: Any, digits: int = 3) -> str:
     """Three significant digits, powers of ten beyond what is easily read."""
     known = finite(value)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from renderer.artist_parameters import ARTIST_PARAMETERS, ParameterSpec
-from tuner.report_page.page_text import finite, number
+from tuner.report_page.page_text import finite, number, words
 from tuner.report_page.scaled_axis import Axis
 
 BAR_WIDTH = 180.0
@@ -35,7 +35,7 @@ class ParameterRow:
     interval: str
     """The stated interval, or empty."""
     source: str
-    """Where the value comes from."""
+    """What the value was determined by."""
     trades_with: str
     fitted: bool
 
@@ -70,29 +70,30 @@ def _row(spec: ParameterSpec, raw: Any, doubt: Mapping[str, Any]) -> ParameterRo
         bar=_bar(spec, finite(raw), interval),
         interval=f"{number(interval[0])} to {number(interval[1])}" if interval else "",
         source=_source(spec, doubt),
-        trades_with=", ".join(str(name).replace("_", " ") for name in trades)
-        if isinstance(trades, list)
-        else "",
+        trades_with=", ".join(words(str(name)) for name in trades) if isinstance(trades, list) else "",
         fitted=spec.fitted or bool(doubt),
     )
 
 
 def _source(spec: ParameterSpec, doubt: Mapping[str, Any]) -> str:
     if "determined" in doubt:
-        return "determined by the scene" if doubt["determined"] is True else "from the prior"
-    return "fitted" if spec.fitted else "as at the start"
+        return "the scene" if doubt["determined"] is True else "the prior"
+    return "the fit" if spec.fitted else "not fitted"
 
 
 def _bar(spec: ParameterSpec, value: float | None, interval: tuple[float, float] | None) -> RangeBar | None:
     if value is None:
         return None
     axis = Axis(float(spec.low), float(spec.high), _MARGIN, BAR_WIDTH - _MARGIN, spec.scale)
-    words = f"{number(value, 4)} in the allowed range from {number(spec.low)} to {number(spec.high)}"
+    described = f"{number(value, 4)} in the allowed range from {number(spec.low)} to {number(spec.high)}"
     ends = None
     if interval is not None:
         left, right = (axis.place(end) for end in interval)
         ends = (left, max(round(right - left, 2), 1.0))
-        words += f", between {number(interval[0])} and {number(interval[1])}"
+        described += f", between {number(interval[0])} and {number(interval[1])}"
     return RangeBar(
-        axis.place(value), axis.place(float(spec.default)), ends, f"{words}; default {number(spec.default)}"
+        axis.place(value),
+        axis.place(float(spec.default)),
+        ends,
+        f"{described}; default {number(spec.default)}",
     )

@@ -39,8 +39,9 @@ class Axis:
 
     def _log_ticks(self, about: int) -> list[float]:
         low, high = math.floor(math.log10(self.low)), math.ceil(math.log10(self.high))
-        mantissas = (1, 2, 5) if (high - low) * 2 <= about else (1,)
-        stride = max(1, round((high - low) / about))
+        decades = high - low
+        mantissas = (1, 2, 5) if decades <= 2 else (1, 3) if decades <= 4 else (1,)
+        stride = max(1, round(decades / about))
         candidates = [m * 10.0**exponent for exponent in range(low, high + 1, stride) for m in mantissas]
         inside = [value for value in candidates if self.low * (1 - 1e-9) <= value <= self.high * (1 + 1e-9)]
         return inside if len(inside) >= 2 else [self.low, self.high]

@@ -8,7 +8,7 @@ from tuner.report_page.charts import Bar, bars, loss_chart, pareto_chart
 from tuner.report_page.error_maps import DIVERGING, MAGMA
 from tuner.report_page.fit_folder import FitFolder, split_figures
 from tuner.report_page.page_template import MAXIMUM_PAGE_BYTES, page_html
-from tuner.report_page.page_text import change, finite, number, seconds
+from tuner.report_page.page_text import change, finite, number, seconds, words
 from tuner.report_page.parameter_rows import parameter_rows
 from tuner.report_page.view_blocks import SHOWN, ViewBlock, view_block
 from tuner.view_pictures import VARIANTS
@@ -156,13 +156,11 @@ def _front_row(point: Mapping[str, Any]) -> dict[str, str]:
     return {
         "milliseconds": number(point.get("milliseconds")),
         "relmse": number(point.get("relmse")),
-        "parameters": ", ".join(f"{name.replace('_', ' ')} {number(value)}" for name, value in named),
+        "parameters": ", ".join(f"{words(name)} {number(value)}" for name, value in named),
         "config": str(point.get("config", "")),
     }
 
 
 def _origin(fit: FitFolder) -> list[tuple[str, str]]:
     entries = {"scene file": fit.document.get("scene", ""), **fit.part("provenance")}
-    return [
-        (name.replace("_", " "), str(value)) for name, value in entries.items() if value not in (None, "")
-    ]
+    return [(words(name), str(value)) for name, value in entries.items() if value not in (None, "")]

@@ -186,6 +186,8 @@ def test_it_fits_every_screen_and_prints(chromium, library, width, scheme):
         shown.page.emulate_media(media="print")
         assert not shown.page.locator(".filter").is_visible()
         assert shown.page.locator("#tuned").is_visible()
+        shown.page.set_viewport_size({"width": 718, "height": 1000})
+        assert shown.page.evaluate("document.documentElement.scrollWidth") <= 718
         assert shown.page.pdf(format="A4").startswith(b"%PDF-")
 
 

@@ -194,7 +194,7 @@ def test_a_front_is_drawn_from_fast_to_slow_with_ceiling_and_budget():
     assert len(chart.line) == 2
     assert chart.line[0][0] < chart.line[1][0]
     assert chart.line[0][1] < chart.line[1][1] < chart.levels[0][0]
-    assert [mark.label for mark in chart.marks] == ["", "", "asked for 4 ms"]
+    assert [mark.label for mark in chart.marks] == ["asked for 4 ms"]
     assert pareto_chart([], 0.05, None) is None
 
 
@@ -225,8 +225,8 @@ def test_uncertainty_is_an_interval_a_source_and_what_it_trades_with():
     assert left < rows["intensity"].bar.value < left + width
     # The whole range: from end to end of the bar.
     assert rows["falloff_footprint"].bar.interval == (5.0, BAR_WIDTH - 10.0)
-    assert rows["intensity"].source == "determined by the scene"
-    assert rows["falloff_footprint"].source == "from the prior"
+    assert rows["intensity"].source == "the scene"
+    assert rows["falloff_footprint"].source == "the prior"
     assert rows["falloff_footprint"].trades_with == "intensity"
     assert rows["falloff_transmittance"].bar.interval is None
 

@@ -18,7 +18,8 @@ from tuner.view_pictures import MAXIMUM_PIXELS
 
 def test_it_names_the_page_it_wrote(fit_copy, capfd):
     assert run(["report", str(fit_copy), "--json"]) == 0
-    assert json.loads(capfd.readouterr().out) == {"pages": [str(fit_copy / "report.html")], "status": "ok"}
+    written = {"pages": [str(fit_copy / "report.html")], "problems": [], "status": "ok"}
+    assert json.loads(capfd.readouterr().out) == written
     assert (fit_copy / "report.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     assert not [path for path in fit_copy.iterdir() if path.name.startswith(".")]
 

@@ -1,4 +1,4 @@
-"""`vpltune export`: a config in the form another program takes."""
+"""`vpltune export`: a config in the form another program takes, alone or with a scene to draw."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -6,13 +6,30 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from renderer.errors import InputError
-from tuner.commands.options import JsonOption
-from tuner.commands.report import Report
+from tuner.commands.options import (
+    EyeOption,
+    JsonOption,
+    LightConeOption,
+    LightDirectionOption,
+    LightIntensityOption,
+    LightLookAtOption,
+    LightPositionOption,
+    LightTypeOption,
+    LookAtOption,
+    VisibilityOption,
+    YfovOption,
+    parse_size,
+)
+from tuner.commands.report import Report, warn
 
 if TYPE_CHECKING:
+    from renderer.scene_bundle import SceneBundle
     from renderer.tuned_config import TunedConfig
+    from tuner.commands.view_flags import ViewFlags
 
-Form = Literal["json", "glsl", "c", "std140", "gltf"]
+Form = Literal["json", "glsl", "c", "std140", "gltf", "bundle"]
+WITH_SCENE = ("gltf", "bundle")
+WITH_VIEW = ("bundle",)
 
 
 def export(
@@ -26,31 +43,67 @@ def export(
         Form,
         typer.Option(
             help="Normalised JSON; GLSL constants or uniform block; a C header; the bytes of that block; the "
-            "extras of a copy of --scene."
+            "extras of a copy of --scene; or all that a program needs to draw --scene, as JSON and one .bin."
         ),
     ],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="The file to write.")],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="OUT", help="The file to write; for a bundle, the folder."),
+    ],
     scene: Annotated[
         Path | None,
-        typer.Option(metavar="SCENE", help="gltf: the .gltf or .glb to copy.", show_default=False),
+        typer.Option(metavar="SCENE", help="gltf, bundle: the scene.", show_default=False),
     ] = None,
+    size: Annotated[str | None, typer.Option(metavar="WxH", help="Picture size. [960x540]")] = None,
+    visibility: VisibilityOption = None,
+    views: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Take camera, lights and size from a views.json.")
+    ] = None,
+    view: Annotated[str | None, typer.Option(metavar="NAME", help="Which of its views.")] = None,
+    eye: EyeOption = None,
+    look_at: LookAtOption = None,
+    yfov: YfovOption = None,
+    light_type: LightTypeOption = None,
+    light_position: LightPositionOption = None,
+    light_look_at: LightLookAtOption = None,
+    light_direction: LightDirectionOption = None,
+    light_intensity: LightIntensityOption = None,
+    light_cone: LightConeOption = None,
     json: JsonOption = False,
 ) -> Report:
-    """Write a config for another program: as text, as bytes, or into a glTF scene."""
+    """Write a config for another program: as text, as bytes, into a glTF scene, or with a scene to draw."""
     from rich.markup import escape
 
     from renderer.tuned_config import read_config
+    from tuner.commands.view_flags import ViewFlags
 
-    needs_scene = to == "gltf"
-    if needs_scene and scene is None:
+    flags = ViewFlags(
+        eye,
+        look_at,
+        yfov,
+        light_type,
+        light_position,
+        light_look_at,
+        light_direction,
+        light_intensity,
+        light_cone,
+    )
+    if to in WITH_SCENE and scene is None:
         raise InputError(f"--scene: must be given with --to {to}")
-    if not needs_scene and scene is not None:
+    if to not in WITH_SCENE and scene is not None:
         raise InputError(f"--scene: --to {to} takes none")
-    config = read_config(file)
-    _write(config, to, output, scene)
+    if to not in WITH_VIEW and (flags != ViewFlags() or views or view or size):
+        raise InputError(f"--to {to}: takes no camera, light, view or size; --to {WITH_VIEW[0]} does")
+    config = read_config(file).seen_by(visibility)
+    if to in WITH_VIEW:
+        assert scene is not None
+        _write_with_view(config, output, _bundle(config, scene, size, views, view, flags))
+    else:
+        _write(config, to, output, scene)
     document = {
         "output": str(output),
         "to": to,
+        "visibility": config.visibility,
         "parameters": config.parameters.as_dict(),
         "status": "ok",
     }
@@ -72,3 +125,50 @@ def _write(config: "TunedConfig", to: Form, output: Path, scene: Path | None) ->
     content = exported(config, to)
     with written_whole(output) as temporary:
         temporary.write_bytes(content)
+
+
+def _bundle(
+    config: "TunedConfig",
+    scene: Path,
+    size: str | None,
+    views: Path | None,
+    name: str | None,
+    flags: "ViewFlags",
+) -> "SceneBundle":
+    import dataclasses
+
+    from tuner.commands.chosen_view import placed_view, view_from_file
+    from tuner.commands.view_flags import camera_from_flags, light_from_flags
+
+    picture_size = None if size is None else parse_size(size)
+    chosen = view_from_file(views, name, flags)
+    camera, light = camera_from_flags(flags), light_from_flags(flags)
+
+    from renderer.scene_bundle import scene_bundle
+    from renderer.scene_file import read_scene
+
+    loaded = read_scene(scene)
+    warn(loaded.warnings)
+    drawn = chosen or placed_view(loaded, scene, camera, light)
+    if picture_size is not None:
+        drawn = dataclasses.replace(drawn, size=picture_size)
+    if loaded.animation is not None:
+        warn(("the scene's animation is left out: it stands as it does at rest",))
+    return scene_bundle(loaded, drawn, config)
+
+
+def _write_with_view(config: "TunedConfig", output: Path, bundle: "SceneBundle") -> None:
+    from renderer.scene_bundle import write_bundle
+
+    warn(undrawn(config))
+    write_bundle(output, bundle)
+
+
+def undrawn(config: "TunedConfig") -> tuple[str, ...]:
+    """What of a config the reader of a bundle leaves out, a line each."""
+    lines = []
+    if config.parameters.screen_space_strength > 0.0:
+        lines.append("the screen-space near field is not drawn outside the runtime")
+    if config.parameters.density_importance > 0.0:
+        lines.append("VPLs are placed by flux alone outside the runtime, with the same mean and more noise")
+    return tuple(lines)

@@ -30,11 +30,9 @@ from tuner.commands.report import Report, warn
 if TYPE_CHECKING:
     from renderer.light_motion import BouncingLights
     from renderer.runtime import Runtime
-    from renderer.scene import Camera, Light, Scene
+    from renderer.scene import Scene
     from renderer.views import View
-    from tuner.commands.view_flags import ViewFlags
 
-DEFAULT_SIZE = (960, 540)
 LARGEST_DYNAMIC_LIGHT_COUNT = 1_000_000
 DYNAMIC_LIGHT_SEED = 0
 
@@ -91,6 +89,7 @@ def render(
     from renderer.runtime_options import INTERLEAVES
     from renderer.tuned_config import read_config
     from renderer.video_file import check_clip_path
+    from tuner.commands.chosen_view import DEFAULT_SIZE, placed_view, view_from_file
     from tuner.commands.render_clip import write_clip
     from tuner.commands.view_flags import ViewFlags, camera_from_flags, light_from_flags
 
@@ -117,7 +116,7 @@ def render(
     if interleave not in INTERLEAVES:
         raise InputError(f"--interleave: must be one of {INTERLEAVES}, got {interleave}")
     tuned = read_config(config).seen_by(visibility)
-    from_file = _view_from_file(views, view, flags)
+    from_file = view_from_file(views, view, flags)
     camera, light = camera_from_flags(flags), light_from_flags(flags)
 
     from renderer.runtime import Runtime
@@ -129,7 +128,7 @@ def render(
 
     loaded = read_scene(scene)
     warn(loaded.warnings)
-    drawn = from_file or _placed_view(loaded, scene, camera, light)
+    drawn = from_file or placed_view(loaded, scene, camera, light)
     if picture_size is not None:
         drawn = View(drawn.name, drawn.split, picture_size, drawn.camera, drawn.lights)
     sequence = Sequence(loaded, drawn, motion, factor)
@@ -143,38 +142,6 @@ def render(
         write_clip(runtime, sequence, layer, output, frames, fps, bouncing)
     clip = {} if frames is None else {"frames": frames, "fps": fps}
     return _report(scene, output, layer, tuned.parameters.as_dict(), drawn, clip)
-
-
-def _view_from_file(path: Path | None, name: str | None, flags: "ViewFlags") -> "View | None":
-    from renderer.views import read_views
-    from tuner.commands.view_flags import ViewFlags
-
-    if path is None:
-        if name is not None:
-            raise InputError("--view: names a view of --views FILE, which is missing")
-        return None
-    if flags != ViewFlags():
-        raise InputError("--views: has its own camera and lights; leave out the camera and light flags")
-    found = read_views(path)
-    names = [view.name for view in found]
-    if name is None and len(found) > 1:
-        raise InputError(f"--view: must be given, {path} has {', '.join(names)}")
-    if name is not None and name not in names:
-        raise InputError(f"--view: {path} has {', '.join(names)}, got {name!r:.60}")
-    return found[0] if name is None else found[names.index(name)]
-
-
-def _placed_view(
-    scene: "Scene", scene_path: Path, camera_given: "Camera | None", light_given: "Light | None"
-) -> "View":
-    from renderer.view_placement import resolve_camera_and_lights
-    from renderer.views import View
-
-    camera, lights, notes = resolve_camera_and_lights(
-        scene, scene_path, camera_given, None if light_given is None else (light_given,)
-    )
-    warn(notes)
-    return View("main", "fitted", DEFAULT_SIZE, camera, lights)
 
 
 def _bouncing_lights(scene: "Scene", view: "View", count: int) -> "BouncingLights | None":

@@ -1,0 +1,143 @@
+"""The example that reads an exported bundle draws the runtime's picture, without any of our packages."""
+
+import dataclasses
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from built_scenes import ROOM_LIGHTS, colored_room, room_view
+from PIL import Image
+
+import renderer
+from renderer.artist_parameters import ArtistParameters
+from renderer.scene import Texture
+from renderer.scene_bundle import scene_bundle, write_bundle
+from renderer.tuned_config import TunedConfig
+from tuner.__main__ import run
+
+READER = Path(__file__).resolve().parents[1] / "examples" / "standalone_reader.py"
+SCENES = READER.parents[1] / "configs" / "scenes"
+# Importing one of ours would fail.
+WITHOUT_US = (
+    "import runpy, sys\n"
+    "sys.modules.update(dict.fromkeys(['renderer', 'tuner', 'shaders', 'configs']))\n"
+    "sys.argv = sys.argv[1:]\n"
+    "runpy.run_path(sys.argv[0], run_name='__main__')"
+)
+CONFIG = TunedConfig(
+    ArtistParameters(
+        intensity=1.3, falloff_footprint=0.8, falloff_transmittance=0.4, vpl_count=200, density_exponent=0.7
+    )
+)
+
+
+def textured_room():
+    """The room with a texture on its coloured walls: repeated, mirrored, minified."""
+    room = colored_room()
+    v, u = np.mgrid[0:32, 0:32]
+    texels = np.stack([255 - 7 * u, 40 + 6 * v, 128 + 4 * ((u + v) % 32)], axis=-1).astype(np.uint8)
+    coordinates = np.float32([[0, 0], [3, 0], [3, 2], [0, 2]])
+    return dataclasses.replace(
+        room,
+        textures=(
+            Texture("repeated", texels),
+            Texture("mirrored", texels, "mirrored_repeat", "clamp_to_edge"),
+        ),
+        materials=tuple(
+            dataclasses.replace(material, texture=texture)
+            for material, texture in zip(room.materials, (None, 0, 1), strict=True)
+        ),
+        meshes=tuple(dataclasses.replace(mesh, uv=coordinates) for mesh in room.meshes),
+    )
+
+
+def read_picture(folder, output):
+    command = [sys.executable, "-c", WITHOUT_US, str(READER), str(folder), str(output)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=folder, check=False)
+    assert done.returncode == 0, done.stderr
+    return np.asarray(Image.open(output)), done.stderr
+
+
+@pytest.mark.parametrize(
+    ("light", "visibility"),
+    [
+        ("spot", "none"),
+        ("spot", "transmittance"),
+        ("wide_spot", "transmittance"),
+        ("point", "transmittance"),
+        ("directional", "transmittance"),
+    ],
+)
+def test_the_picture_is_the_runtimes(tmp_path, light, visibility):
+    scene, view, config = textured_room(), room_view(light, (96, 72)), CONFIG.seen_by(visibility)
+    write_bundle(tmp_path, scene_bundle(scene, view, config, rsm_resolution=256))
+    picture, said = read_picture(tmp_path, tmp_path / "picture.png")
+    ours = renderer.Runtime(scene, config, rsm_resolution=256).render(view)
+    assert said == ""
+    assert np.ptp(ours) > 100
+    difference = np.abs(picture.astype(int) - ours)
+    # Where the edge of a triangle passes through a pixel's centre, rounding decides which side is drawn.
+    assert (difference.max(axis=-1) > 1).mean() < 1e-3, difference.max()
+    assert difference.mean() < 0.1
+
+
+def test_several_lights_share_the_vpls(tmp_path):
+    scene, view = colored_room(), room_view("spot", (64, 48))
+    view = dataclasses.replace(
+        view, lights=(ROOM_LIGHTS["directional"], ROOM_LIGHTS["point"], ROOM_LIGHTS["spot"])
+    )
+    write_bundle(tmp_path, scene_bundle(scene, view, CONFIG, rsm_resolution=128))
+    picture, _ = read_picture(tmp_path, tmp_path / "picture.png")
+    ours = renderer.Runtime(scene, CONFIG, rsm_resolution=128).render(view)
+    assert (np.abs(picture.astype(int) - ours).max(axis=-1) > 1).mean() < 1e-3
+
+
+def test_a_shipped_scene_by_the_command_line(tmp_path, capfd):
+    """Every pixel to 1/255, with the runtime's own defaults."""
+    scene = SCENES / "cornell-box.glb"
+    common = ["--size", "96x72", "--visibility", "transmittance"]
+    bundle = tmp_path / "bundle"
+    assert (
+        run(["export", "default", "--to", "bundle", "--scene", str(scene), "-o", str(bundle), *common]) == 0
+    )
+    assert run(["render", str(scene), "-o", str(tmp_path / "ours.png"), *common]) == 0
+    picture, _ = read_picture(bundle, tmp_path / "theirs.png")
+    ours = np.asarray(Image.open(tmp_path / "ours.png")).astype(int)
+    assert np.abs(picture - ours).max() <= 1
+
+
+def test_the_reader_is_short_and_says_what_it_leaves_out(tmp_path):
+    assert len(READER.read_text(encoding="utf-8").splitlines()) < 150
+    view, config = room_view("spot", (16, 12)), CONFIG.seen_by("maps")
+    write_bundle(tmp_path, scene_bundle(colored_room(), view, config, rsm_resolution=64))
+    assert "visibility maps are not drawn here" in read_picture(tmp_path, tmp_path / "picture.png")[1]
+
+
+def test_a_bundle_is_json_that_describes_its_bytes(tmp_path):
+    view = room_view("point", (16, 12))
+    write_bundle(tmp_path, scene_bundle(textured_room(), view, CONFIG))
+    document = json.loads((tmp_path / "bundle.json").read_text())
+    content = (tmp_path / "bundle.bin").read_bytes()
+    for name, array in document["arrays"].items():
+        assert array["offset"] % 4 == 0 and array["offset"] + array["bytes"] <= len(content), name
+        assert np.prod(array["shape"]) * np.dtype(array["type"]).itemsize == array["bytes"], name
+    assert document["config"]["parameters"] == CONFIG.parameters.as_dict()
+    assert len(document["rsm"]["faces"]) == 6
+    assert sum(draw["count"] for draw in document["draws"]) == textured_room().triangle_count()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--to", "bundle"], "--scene: must be given with --to bundle"),
+        (["--to", "json", "--size", "4x4"], "--to json: takes no camera, light, view or size"),
+        (["--to", "c", "--scene", "a.glb"], "--scene: --to c takes none"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(tmp_path, capfd, arguments, message):
+    assert run(["export", "default", "-o", str(tmp_path / "out"), *arguments]) == 2
+    assert message in capfd.readouterr().err
+    assert not list(tmp_path.iterdir())

@@ -1,7 +1,6 @@
 """Draws a scene that VPLtune exported, without VPLtune: python standalone_reader.py BUNDLE OUT.png
 
-`vpltune export tuned.json --to bundle --scene scene.glb -o BUNDLE` writes numbers only; what is done with them
-is here and in standalone_reader.glsl: reflective shadow maps, VPLs, their gather, shadows, tone curve.
+BUNDLE: `vpltune export tuned.json --to bundle --scene scene.glb -o BUNDLE`. Shaders: standalone_reader.glsl.
 """
 
 import json
@@ -21,8 +20,8 @@ class Surfaces:
     def __init__(self, context, bundle, binary):
         self.context, self.bundle = context, bundle
         self.program = context.program(*(GLSL.replace("STAGE", name, 1) for name in ("VERTEX", "FRAGMENT")))
-        arrays = bundle["arrays"].items()
-        self.part = {name: context.buffer(binary[a["offset"] :][: a["bytes"]]) for name, a in arrays}
+        part = {name: (a["offset"], a["offset"] + a["bytes"]) for name, a in bundle["arrays"].items()}
+        self.part = {name: context.buffer(binary[slice(*place)]) for name, place in part.items()}
         layouts = {"positions": "3f", "normals": "3f", "uv": "2f", "base_colors": "3f"}
         content = [(self.part[name], layout, f"in_{name}") for name, layout in layouts.items()]
         self.vertices = context.vertex_array(self.program, content, index_buffer=self.part["triangles"])
@@ -70,7 +69,7 @@ def light_maps(surfaces, rsm):  # an atlas of position, depth, plane's normal, a
 def virtual_point_lights(atlas, bundle):
     """Rows of position, footprint, normal, 0, flux, 0, drawn with chances of flux^gamma; and the length L."""
     rsm, parameters, flux = bundle["rsm"], bundle["config"]["parameters"], atlas[..., 8:11].mean(-1)
-    size, count = rsm["resolution"], parameters["vpl_count"]
+    size, filtering, count = rsm["resolution"], rsm["filtering"], parameters["vpl_count"]
     offset = atlas[..., :3] - (flux[..., None] * atlas[..., :3]).sum((0, 1)) / flux.sum()
     length = np.sqrt((flux * (offset**2).sum(-1)).sum() / flux.sum())
     weight = np.where(flux > 0, flux ** parameters["density_exponent"], 0)
@@ -82,19 +81,19 @@ def virtual_point_lights(atlas, bundle):
     right = 1 + (x * in_row[row, -1] - in_row[row, column]) / weight[row, column]
     up = 1 + (y * rows[-1] - rows[row]) / in_row[row, -1]
     # Each VPL has the mean light of the texels around its own.
-    reach, at = np.arange(rsm["filtering"]) - rsm["filtering"] // 2, np.stack([row, column], axis=1)
-    window = at[:, None] + np.stack(np.meshgrid(reach, reach), axis=-1).reshape(-1, 2)
+    at = np.stack([row, column], axis=1)
+    window = at[:, None] + np.array([*np.ndindex(filtering, filtering)]) - filtering // 2
     around = tuple(np.moveaxis(window % weight.shape, -1, 0))
     lit = (window // size == at[:, None] // size).all(-1) & (flux[around] > 0)
     draws = count * (weight[around] * lit).sum(1)[:, None] / rows[-1]
     near = (atlas[around] * lit[..., None]).sum(1) / draws
     # It slides with that place over the plane of its own texel.
-    number = row // size * (weight.shape[1] // size) + column // size
-    faces = [[face[key] for face in rsm["faces"]] for key in ("light_to_world", "extent", "orthographic")]
-    to_world, extent, flat = (np.array(values)[number] for values in faces)
-    place = (np.stack([column % size + right, row % size + up], axis=1) * 2 / size - 1) * extent
-    across = np.einsum("nij,nj->ni", to_world[:, :3, :2], place)
-    start, ray = to_world[:, :3, 3] + across * flat[:, None], across * ~flat[:, None] - to_world[:, :3, 2]
+    faces = [rsm["faces"][number] for number in row // size * (weight.shape[1] // size) + column // size]
+    to_world, extent = (np.array([face[key] for face in faces]) for key in ("light_to_world", "extent"))
+    flat = np.array([[face["orthographic"]] for face in faces])
+    place = np.stack([column % size + right, row % size + up], axis=1) * 2 / size - 1
+    across = np.einsum("nij,nj->ni", to_world[:, :3, :2], place * extent)
+    start, ray = to_world[:, :3, 3] + across * flat, across * ~flat - to_world[:, :3, 2]
     position, normal = atlas[row, column, :3], atlas[row, column, 4:7]
     along = (normal * ray).sum(1, keepdims=True)
     slid = start + ray * ((normal * (position - start)).sum(1, keepdims=True) / along)
@@ -114,8 +113,8 @@ def displayed(radiance, key):
     white = 1 - 1 / (0.15 * (peak - shoulder) + 1)
     bent = color * shoulder / np.maximum(peak, 1e-9) * (1 - white) + shoulder * white
     color = np.clip(np.where(peak < 0.76, color, bent), 0, 1)
-    curve = 1.055 * np.maximum(color, 1e-9) ** (1 / 2.4) - 0.055
-    return np.round(255 * np.where(color <= 0.0031308, 12.92 * color, curve)).astype("u1")
+    encoded = np.where(color > 0.0031308, 1.055 * np.maximum(color, 1e-9) ** (1 / 2.4) - 0.055, 12.92 * color)
+    return np.round(255 * encoded).astype("u1")
 
 
 def main(folder, output):
@@ -136,8 +135,8 @@ def main(folder, output):
     )
     for unit, texture in enumerate([*targets, depths]):
         texture.use(unit)
-    surfaces.part["faces"].bind_to_storage_buffer(1)
-    context.buffer(vpls).bind_to_storage_buffer(2)
+    for binding, rows in ((1, surfaces.part["faces"]), (2, context.buffer(vpls))):
+        rows.bind_to_storage_buffer(binding)
     for name in ("intensity", "falloff_footprint", "falloff_transmittance"):
         lighting[name] = parameters[name]
     lighting["scene_length"], lighting["size"] = length, bundle["rsm"]["resolution"]

@@ -11,6 +11,16 @@ from renderer.views import View, ray_directions_world
 
 
 @dataclass(frozen=True, eq=False)
+class VisibilityMaps:
+    """The surfaces that each VPL sees, along one ray for each texel of its hemisphere."""
+
+    distance: Float32[np.ndarray, "vpls size size"]
+    """In units of L."""
+    normal: Float32[np.ndarray, "vpls size size 3"]
+    """Towards the VPL, in its own frame (`hemisphere_frame`)."""
+
+
+@dataclass(frozen=True, eq=False)
 class CapturedFrame:
     """What the gather reads and what it makes, for one view; lengths in world units."""
 
@@ -33,8 +43,8 @@ class CapturedFrame:
     """Radius of the disc that the VPL stands for."""
     vpl_flux: Float32[np.ndarray, "vpls 3"]
     """Reflected radiant flux [W]."""
-    visibility_maps: Float32[np.ndarray, "vpls size size"] | None
-    """Distance to the nearest surface, in units of L, over each VPL's hemisphere; None without maps."""
+    visibility_maps: VisibilityMaps | None
+    """None where the config asks for none."""
     scene_length: float
     """L: flux-weighted RMS distance of the lit RSM texels from their centroid."""
 
@@ -66,12 +76,14 @@ def capture_frame(frame: Frame, view: View) -> CapturedFrame:
     )
 
 
-def _visibility_maps(frame: Frame) -> Float32[np.ndarray, "vpls size size"] | None:
+def _visibility_maps(frame: Frame) -> VisibilityMaps | None:
     if frame.vpl_visibility_maps is None:
         return None
-    texels = np.frombuffer(frame.vpl_visibility_maps.maps.read(), np.float32)
     size = frame.vpl_visibility_maps.size
-    return texels.reshape(-1, size, size)
+    texels = np.frombuffer(frame.vpl_visibility_maps.maps.read(), np.uint32).reshape(-1, size, size, 2)
+    packed = np.stack([texels[..., 1] & 0xFFFF, texels[..., 1] >> 16], axis=-1)
+    encoded = packed.astype(np.float32) / np.float32(65535.0)
+    return VisibilityMaps(texels[..., 0].copy().view(np.float32), octahedral_decode(encoded))
 
 
 _DTYPES = {"f1": np.uint8, "f2": np.float16, "f4": np.float32, "nu2": np.uint16}

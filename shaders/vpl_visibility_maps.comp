@@ -1,4 +1,4 @@
-// A small map of what each VPL sees: one ray for each texel of its hemisphere, through the scene's hierarchy.
+// A small map of the surfaces each VPL sees: one ray for each texel of its hemisphere, through the hierarchy.
 // One workgroup for each VPL.
 #include "common/scene_length.glsl"
 #include "common/virtual_point_lights.glsl"
@@ -22,9 +22,16 @@ void main() {
     const int texels = VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE;
     for (int i = int(gl_LocalInvocationIndex); i < texels; i += 64) {
         ivec2 texel = ivec2(i % VISIBILITY_MAP_SIZE, i / VISIBILITY_MAP_SIZE);
-        vec3 axis = hemi_octahedral_decode((vec2(texel) + 0.5) * (2.0 / float(VISIBILITY_MAP_SIZE)) - 1.0);
-        float nearest = lit ? ray_distance(origin, frame * axis, longest) : longest;
-        // What meets nothing is twice the scene away: farther than any receiver's plane that matters.
-        visibility_maps[vpl_index * texels + i] = (nearest < longest ? nearest : 2.0 * longest) / scene_length;
+        vec3 axis = visibility_axis(texel);
+        vec3 direction = frame * axis;
+        RayHit hit = RayHit(longest, RAY_NO_TRIANGLE, 0u);
+        if (lit) {
+            hit = ray_hit(origin, direction, longest);
+        }
+        // What meets nothing ends twice the scene away, at a wall that faces the VPL: no receiver is behind it.
+        bool met = hit.triangle != RAY_NO_TRIANGLE;
+        float end = met ? hit.distance : 2.0 * longest;
+        vec3 normal = met ? ray_hit_normal(hit, direction) * frame : -axis;
+        visibility_maps[vpl_index * texels + i] = visibility_texel(end / scene_length, normal);
     }
 }

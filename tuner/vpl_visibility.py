@@ -1,20 +1,20 @@
 """What VPLs see, from their visibility maps, in JAX: the twin of shaders/common/vpl_visibility.glsl."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from renderer.artist_parameters import ArtistParameters
-from renderer.capture import CapturedFrame
+from renderer.capture import CapturedFrame, VisibilityMaps
 from tuner.virtual_point_lights import Receivers, VirtualPointLights
 
 VISIBILITY_LIFT = 0.01
 """Footprints by which a map's origin is lifted off the VPL's surface; twin of the shader's constant."""
-VISIBILITY_NEAREST = 0.5
-VISIBILITY_FARTHEST = 1.5
-"""Shares of the receiver's distance at which a texel's axis may meet its plane; twins of the shader's."""
+VISIBILITY_NEAREST = 0.8
+"""Share of the receiver's distance from which a ray says something of the receiver; twin of the shader's."""
 CHUNK = 128
 """Receivers at once: 128 × 1,024 pairs with four texels each are 2 MiB an array."""
 
@@ -22,11 +22,26 @@ CHUNK = 128
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class VisibilityParameters:
-    """bias: share of the distance by which a blocker must stand before the receiver's plane. softness: share
-    of the distance over which light fades in."""
+    """bias: of the distance, by how much a blocker must overlap both planes to block all. softness: of a
+    texel, over which light fades in across a shadow's edge."""
 
     bias: Float[Array, ""]
     softness: Float[Array, ""]
+
+    @classmethod
+    def of(cls, parameters: ArtistParameters) -> "VisibilityParameters":
+        """Those of a config."""
+        return cls(jnp.float32(parameters.visibility_bias), jnp.float32(parameters.visibility_softness))
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class MapTexels:
+    """All texels of all maps, VPL by VPL and row by row, in each VPL's frame."""
+
+    end: Float[Array, "texels 3"]
+    """Where the ray ended, from the map's origin [L]."""
+    normal: Float[Array, "texels 3"]
 
 
 def hemi_octahedral_encode(direction: Float[Array, "*n 3"]) -> Float[Array, "*n 2"]:
@@ -54,70 +69,75 @@ def hemisphere_frame(normal: Float[Array, "vpls 3"]) -> Float[Array, "vpls 3 3"]
     return jnp.stack([tangent, bitangent, normal], axis=1)
 
 
+def map_texels(maps: VisibilityMaps) -> MapTexels:
+    """A frame's maps as `vpl_visibility` takes them."""
+    size = maps.distance.shape[1]
+    centers = (jnp.arange(size) + 0.5) * (2.0 / size) - 1.0
+    axes = hemi_octahedral_decode(jnp.stack(jnp.meshgrid(centers, centers), axis=-1))
+    end = axes[None] * jnp.asarray(maps.distance)[..., None]
+    return MapTexels(end.reshape(-1, 3), jnp.asarray(maps.normal).reshape(-1, 3))
+
+
 def map_visibility(
     captured: CapturedFrame, receivers: Receivers, vpls: VirtualPointLights, parameters: ArtistParameters
 ) -> Float[Array, "receivers vpls"] | None:
     """What the runtime takes the visibility to be: from the frame's maps, or None where it has none."""
     if captured.visibility_maps is None:
         return None
-    chosen = VisibilityParameters(
-        jnp.float32(parameters.visibility_bias), jnp.float32(parameters.visibility_softness)
-    )
-    return vpl_visibility(receivers, vpls, jnp.asarray(captured.visibility_maps), chosen)
+    texels = map_texels(captured.visibility_maps)
+    return vpl_visibility(receivers, vpls, texels, VisibilityParameters.of(parameters))
 
 
 @jax.jit
 def vpl_visibility(
-    receivers: Receivers,
-    vpls: VirtualPointLights,
-    maps: Float[Array, "vpls size size"],
-    parameters: VisibilityParameters,
+    receivers: Receivers, vpls: VirtualPointLights, texels: MapTexels, parameters: VisibilityParameters
 ) -> Float[Array, "receivers vpls"]:
     """Share of each VPL's light that reaches each receiver, in [0, 1]. Twin: `vpl_visibility` in GLSL.
 
-    The four texels around the receiver's direction are compared each along its own axis with the receiver's
-    tangent plane, so that a coarse map does not shade the plane it shows (receiver plane depth bias, Isidoro
-    2006); an axis that misses the plane, with the receiver's distance.
+    What a texel's ray met blocks if it stands before the receiver's tangent plane (receiver plane depth bias,
+    Isidoro 2006) and the receiver behind its own. The blend of the four texels around its direction is
+    cut at one half (Green 2007).
 
     Args:
-        receivers, vpls, maps: lengths in units of L.
+        receivers, vpls: lengths in units of L.
     """
-    size = maps.shape[1]
+    # Every map is square.
+    size = round((texels.end.shape[0] / max(1, len(vpls.position))) ** 0.5)
     frame = hemisphere_frame(vpls.normal)
     origin = vpls.position + VISIBILITY_LIFT * vpls.footprint[:, None] * vpls.normal
-    centers = (jnp.arange(size) + 0.5) * (2.0 / size) - 1.0
-    axes = hemi_octahedral_decode(jnp.stack(jnp.meshgrid(centers, centers), axis=-1)).reshape(-1, 3)
-    flat = maps.reshape(-1)
     first = jnp.arange(len(vpls.position)) * size * size
 
     def chunk(inputs: tuple[Array, Array]) -> Array:
-        position, normal = inputs
-        to_receiver = position[:, None, :] - origin[None, :, :]
-        direction = jnp.einsum("rvk,vak->rva", to_receiver, frame, precision="highest")
-        normal_vpl = jnp.einsum("rk,vak->rva", normal, frame, precision="highest")
-        plane = (to_receiver * normal[:, None, :]).sum(-1)
-        distance = jnp.maximum(jnp.linalg.norm(to_receiver, axis=-1), 1e-9)
-        asked = (direction[..., 2] > 0.0) & (plane < 0.0)
+        position, normal_world = inputs
+        in_frame = partial(jnp.einsum, "rvk,vak->rva", precision="highest")
+        to_receiver = in_frame(position[:, None, :] - origin[None, :, :], frame)
+        normal = jnp.einsum("rk,vak->rva", normal_world, frame, precision="highest")
+        plane = (to_receiver * normal).sum(-1)
+        asked = (to_receiver[..., 2] > 0.0) & (plane < 0.0)
         # Where not asked, any finite direction serves.
-        direction = jnp.where(asked[..., None], direction, jnp.array([0.0, 0.0, 1.0]))
-        place = (hemi_octahedral_encode(direction) * 0.5 + 0.5) * size - 0.5
+        to_receiver = jnp.where(asked[..., None], to_receiver, jnp.array([0.0, 0.0, 1.0]))
+        place = (hemi_octahedral_encode(to_receiver) * 0.5 + 0.5) * size - 0.5
         corner = jnp.floor(place)
         blend = place - corner
+        inverse_squared = 1.0 / (to_receiver**2).sum(-1)
+        sharpness = jnp.sqrt(inverse_squared) / parameters.bias
         visible = weights = 0.0
         for i in range(4):
             step = jnp.array([i & 1, i >> 1])
             texel = jnp.clip(corner.astype(jnp.int32) + step, 0, size - 1)
-            index = texel[..., 1] * size + texel[..., 0]
-            slope = (axes[index] * normal_vpl).sum(-1)
+            index = first + texel[..., 1] * size + texel[..., 0]
+            end, met_normal = texels.end[index], texels.normal[index]
+            before = (end * normal).sum(-1) - plane
+            behind = ((end - to_receiver) * met_normal).sum(-1)
+            blocked = jnp.clip(jnp.minimum(before, behind) * sharpness, 0.0, 1.0)
+            reach = (end * to_receiver).sum(-1) * inverse_squared
+            known = jnp.clip((reach - VISIBILITY_NEAREST) / (1.0 - VISIBILITY_NEAREST), 0.0, 1.0)
             share = jnp.prod(jnp.where(step == 1, blend, 1.0 - blend), axis=-1)
-            meets = slope < -1e-4
-            reach = jnp.where(meets, plane / (jnp.where(meets, slope, -1.0) * distance), 1.0)
-            share = jnp.where(reach > VISIBILITY_NEAREST, share, 0.0)
-            lead = flat[first + index] / (distance * jnp.minimum(reach, VISIBILITY_FARTHEST))
-            lead = lead - 1.0 + parameters.bias
-            visible += share * jnp.clip(lead / parameters.softness + 0.5, 0.0, 1.0)
-            weights += share
+            weight = share * jnp.maximum(blocked, known)
+            visible += weight * (1.0 - blocked)
+            weights += weight
         seen = jnp.where(weights > 1e-4, visible / jnp.maximum(weights, 1e-4), 1.0)
+        seen = jnp.clip((seen - 0.5) / parameters.softness + 0.5, 0.0, 1.0)
         return jnp.where(asked, seen, 1.0)
 
     count = receivers.position.shape[0]

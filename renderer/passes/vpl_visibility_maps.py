@@ -1,4 +1,4 @@
-"""VPL visibility maps: what every VPL sees, a small hemispherical map of distances, cast anew each frame."""
+"""VPL visibility maps: the surfaces every VPL sees, in a small hemispherical map, cast anew each frame."""
 
 import moderngl
 
@@ -6,9 +6,12 @@ from renderer import buffer_bindings
 from renderer.ray_hierarchy import RAY_DEFINES, RayHierarchy
 from renderer.shader_library import load_compute, set_uniforms
 
+TEXEL_BYTES = 8
+"""A distance and a packed normal, see shaders/common/vpl_visibility.glsl."""
+
 
 class VplVisibilityMapsPass:
-    """VPLs, ray hierarchy → one `size`² map of distances for each VPL.
+    """VPLs, ray hierarchy → one `size`² map of surfaces for each VPL.
 
     Imperfect shadow maps (Ritschel et al. 2008) in what they hold; not splatted from points but cast as
     rays, so that a map has no holes and as few texels as it can do with.
@@ -20,7 +23,7 @@ class VplVisibilityMapsPass:
         self.size = size
         defines = {**RAY_DEFINES, "VISIBILITY_MAP_SIZE": size}
         self._program = load_compute(context, "vpl_visibility_maps", defines)
-        self.maps = context.buffer(reserve=vpl_count * size * size * 4)
+        self.maps = context.buffer(reserve=vpl_count * size * size * TEXEL_BYTES)
 
     def draw(self, hierarchy: RayHierarchy, longest: float) -> None:
         """Cast the maps of the VPLs that are bound; `longest` is the scene's diagonal in world units."""

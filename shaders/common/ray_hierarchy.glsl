@@ -95,7 +95,16 @@ float triangle_distance(SpaceRay ray, RayTriangle triangle, float longest) {
     return inside && determinant != 0.0 && t > 0.0 && t < longest ? t : longest;
 }
 
-float traverse_rays(vec3 origin_world, vec3 direction_world, float longest, bool any_hit) {
+// The nearest surface on a ray.
+struct RayHit {
+    float distance;
+    uint triangle;  // RAY_NO_TRIANGLE where nothing is met
+    uint instance;
+};
+
+const uint RAY_NO_TRIANGLE = 0xFFFFFFFFu;
+
+RayHit traverse_rays(vec3 origin_world, vec3 direction_world, float longest, bool any_hit) {
     uint stack[RAY_STACK_SIZE];
     int height = 1;
     stack[0] = RAY_DONE;
@@ -103,6 +112,8 @@ float traverse_rays(vec3 origin_world, vec3 direction_world, float longest, bool
     float reach = nearest;
     SpaceRay ray = space_ray(origin_world, direction_world);
     bool in_instance = false;
+    uint instance = 0u;
+    RayHit hit = RayHit(longest, RAY_NO_TRIANGLE, 0u);
     uint current = 0u;
     while (true) {
         while ((current & RAY_COUNT_MASK) == 0u) {
@@ -130,13 +141,18 @@ float traverse_rays(vec3 origin_world, vec3 direction_world, float longest, bool
         } else if (in_instance) {
             uint end = first + (current & RAY_COUNT_MASK);
             for (uint i = first; i < end; ++i) {
-                nearest = triangle_distance(ray, ray_triangles[i], nearest);
+                float met = triangle_distance(ray, ray_triangles[i], nearest);
+                if (met < nearest) {
+                    nearest = met;
+                    hit = RayHit(met, i, instance);
+                }
             }
             if (any_hit && nearest < reach) {
                 break;
             }
             current = stack[--height];
         } else {
+            instance = first;
             mat3x4 world_to_instance = ray_instances[first].world_to_instance;
             ray = space_ray(
                 vec4(origin_world, 1.0) * world_to_instance, vec4(direction_world, 0.0) * world_to_instance);
@@ -145,15 +161,32 @@ float traverse_rays(vec3 origin_world, vec3 direction_world, float longest, bool
             current = ray_instances[first].root.x;
         }
     }
-    return nearest < reach ? nearest : longest;
+    return hit;
+}
+
+// What the unit direction meets first; nothing farther than `longest`.
+RayHit ray_hit(vec3 origin_world, vec3 direction_world, float longest) {
+    return traverse_rays(origin_world, direction_world, longest, false);
+}
+
+// Unit normal in the world of the triangle that was met, towards the ray's origin.
+vec3 ray_hit_normal(RayHit hit, vec3 direction_world) {
+    RayTriangle triangle = ray_triangles[hit.triangle];
+    vec3 across = cross(triangle.b - triangle.a, triangle.c - triangle.a);
+    // Normals go by the inverse transpose of what positions go by. Scaled first: tiny triangles have tiny
+    // cross products.
+    vec3 size = abs(across);
+    across /= max(max(size.x, size.y), max(size.z, 1e-30));
+    vec3 normal = normalize((ray_instances[hit.instance].world_to_instance * across).xyz);
+    return dot(normal, direction_world) > 0.0 ? -normal : normal;
 }
 
 // Distance along the unit direction to the nearest surface; `longest` where there is none nearer.
 float ray_distance(vec3 origin_world, vec3 direction_world, float longest) {
-    return traverse_rays(origin_world, direction_world, longest, false);
+    return traverse_rays(origin_world, direction_world, longest, false).distance;
 }
 
 // Whether anything stands on the unit direction nearer than `longest`.
 bool ray_blocked(vec3 origin_world, vec3 direction_world, float longest) {
-    return traverse_rays(origin_world, direction_world, longest, true) < longest;
+    return traverse_rays(origin_world, direction_world, longest, true).triangle != RAY_NO_TRIANGLE;
 }

@@ -1,13 +1,16 @@
-// What a VPL sees, from its small map of distances. Twin: tuner/vpl_visibility.py.
+// What a VPL sees, from its small map of surfaces. Twin: tuner/vpl_visibility.py.
 #include "common/hemi_octahedral.glsl"
+#include "common/octahedral.glsl"
 
+// [vpls, size, size]: what a ray along the texel's axis meets, as its distance [L] in bits of a float, and its
+// normal towards the VPL in the VPL's frame, octahedral in 2 × 16 bits.
 layout(std430, binding = VISIBILITY_MAPS_BINDING) buffer VisibilityMaps {
-    float visibility_maps[];  // [vpls, size, size]: distance to the nearest surface along the texel's axis [L]
+    uvec2 visibility_maps[];
 };
 
 struct VisibilityParameters {
-    float bias;      // of the distance, by which a blocker must stand before the receiver's plane
-    float softness;  // of the distance, over which light fades in
+    float bias;      // of the distance: by how much a blocker must overlap both planes to block all
+    float softness;  // of a texel, over which light fades in across a shadow's edge
 };
 
 // Rays start, and distances count, from a point lifted off the VPL's surface by this many footprints.
@@ -17,47 +20,58 @@ vec3 visibility_origin(VirtualPointLight vpl) {
     return vpl.position_footprint.xyz + vpl.normal_area.xyz * (VISIBILITY_LIFT * vpl.position_footprint.w);
 }
 
-// A texel's axis may meet the receiver's plane far before the receiver or far behind it: before this share of
-// the distance it says nothing of the receiver, and beyond the other it is asked no farther.
-const float VISIBILITY_NEAREST = 0.5;
-const float VISIBILITY_FARTHEST = 1.5;
+vec3 visibility_axis(ivec2 texel) {
+    return hemi_octahedral_decode((vec2(texel) + 0.5) * (2.0 / float(VISIBILITY_MAP_SIZE)) - 1.0);
+}
 
-// Share of a VPL's light that reaches a receiver: the four texels around its direction, compared each along
-// its own axis with the receiver's tangent plane, so that a coarse map does not shade the plane it shows
-// (receiver plane depth bias, Isidoro 2006); an axis that misses the plane, with the receiver's distance.
+uvec2 visibility_texel(float distance_in_l, vec3 normal_vpl) {
+    return uvec2(floatBitsToUint(distance_in_l), packUnorm2x16(octahedral_encode(normal_vpl)));
+}
+
+// A ray that ended unblocked says little of what lies behind its end: before this share of the receiver's
+// distance nothing, from there to the whole distance ever more.
+const float VISIBILITY_NEAREST = 0.8;
+
+// Share of a VPL's light that reaches a receiver: the four texels around its direction. What a texel's ray met
+// blocks if it stands before the receiver's tangent plane and the receiver behind its own. The first is receiver
+// plane depth bias (Isidoro 2006); with the second, surfaces of one convex room or one convex body never shade
+// each other, however coarse the map, and a wall may be as thin as it likes. The blend of the four is cut at one
+// half, which finds an edge between the texels that it passes (Green 2007, alpha-tested magnification).
 float vpl_visibility(
     vec3 position_world, vec3 normal_world, VirtualPointLight vpl, mat3 frame, int map_start,
     float scene_length, VisibilityParameters parameters
 ) {
-    vec3 to_receiver = position_world - visibility_origin(vpl);
-    vec3 normal_vpl = normal_world * frame;
-    vec3 direction = to_receiver * frame;
+    vec3 to_receiver = (position_world - visibility_origin(vpl)) * frame / scene_length;
+    vec3 normal = normal_world * frame;
     // The receiver's plane from the VPL, in units of L; a receiver below the horizon gets nothing anyway.
-    float plane = dot(to_receiver, normal_world) / scene_length;
-    if (!(direction.z > 0.0) || !(plane < 0.0)) {
+    float plane = dot(to_receiver, normal);
+    if (!(to_receiver.z > 0.0) || !(plane < 0.0)) {
         return 1.0;
     }
-    vec2 place = (hemi_octahedral_encode(direction) * 0.5 + 0.5) * float(VISIBILITY_MAP_SIZE) - 0.5;
+    vec2 place = (hemi_octahedral_encode(to_receiver) * 0.5 + 0.5) * float(VISIBILITY_MAP_SIZE) - 0.5;
     vec2 corner = floor(place);
     vec2 blend = place - corner;
-    float distance_to_receiver = length(to_receiver) / scene_length;
+    float inverse_squared = 1.0 / dot(to_receiver, to_receiver);
+    float sharpness = sqrt(inverse_squared) / parameters.bias;
     float visible = 0.0;
     float weights = 0.0;
     for (int i = 0; i < 4; ++i) {
         vec2 step = vec2(i & 1, i >> 1);
         ivec2 texel = clamp(ivec2(corner + step), ivec2(0), ivec2(VISIBILITY_MAP_SIZE - 1));
-        vec3 axis = hemi_octahedral_decode((vec2(texel) + 0.5) * (2.0 / float(VISIBILITY_MAP_SIZE)) - 1.0);
-        float slope = dot(axis, normal_vpl);
-        // 1e-4: an axis that grazes the plane within float32's rounding is taken to miss it.
-        float reach = slope < -1e-4 ? plane / (slope * distance_to_receiver) : 1.0;
-        if (reach > VISIBILITY_NEAREST) {
-            vec2 share = mix(1.0 - blend, blend, step);
-            float nearest = visibility_maps[map_start + texel.y * VISIBILITY_MAP_SIZE + texel.x];
-            float asked = distance_to_receiver * min(reach, VISIBILITY_FARTHEST);
-            float lead = nearest / asked - 1.0 + parameters.bias;
-            visible += share.x * share.y * clamp(lead / parameters.softness + 0.5, 0.0, 1.0);
-            weights += share.x * share.y;
-        }
+        uvec2 met = visibility_maps[map_start + texel.y * VISIBILITY_MAP_SIZE + texel.x];
+        vec3 end = visibility_axis(texel) * uintBitsToFloat(met.x);
+        vec3 met_normal = octahedral_decode(unpackUnorm2x16(met.y));
+        float before = dot(end, normal) - plane;
+        float behind = dot(end - to_receiver, met_normal);
+        float blocked = clamp(min(before, behind) * sharpness, 0.0, 1.0);
+        float reach = dot(end, to_receiver) * inverse_squared;
+        float known = clamp((reach - VISIBILITY_NEAREST) / (1.0 - VISIBILITY_NEAREST), 0.0, 1.0);
+        vec2 share = mix(1.0 - blend, blend, step);
+        float weight = share.x * share.y * max(blocked, known);
+        visible += weight * (1.0 - blocked);
+        weights += weight;
     }
-    return weights > 1e-4 ? visible / weights : 1.0;
+    // 1e-4: where no ray came near the receiver, nothing is known to block.
+    float seen = weights > 1e-4 ? visible / weights : 1.0;
+    return clamp((seen - 0.5) / parameters.softness + 0.5, 0.0, 1.0);
 }

@@ -34,14 +34,15 @@ def surrogate(captured: CapturedFrame, parameters: ArtistParameters) -> np.ndarr
     return np.asarray(jax.jit(gather)(receivers, vpls, FalloffParameters.of(parameters), visibility))
 
 
-@pytest.mark.parametrize("softness", [0.002, 0.02, 0.2])
+@pytest.mark.parametrize(("bias", "softness"), [(0.0005, 0.05), (0.002, 0.5), (0.1, 1.0)])
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
-def test_twins_agree_in_the_room(gl_context, light, softness):
+def test_twins_agree_in_the_room(gl_context, light, bias, softness):
     """1e-3 relative RMSE over all pixels, edges included: a soft comparison turns rounding into rounding.
 
-    The softest edge tested, 0.2 % of the distance, multiplies float32's 1e-7 by 500.
+    The hardest edge tested, within 0.05 % of the distance and 5 % of a texel, multiplies float32's 1e-7 by
+    40,000, for the few pairs that lie on it.
     """
-    parameters = ArtistParameters(vpl_count=256, visibility_softness=softness)
+    parameters = ArtistParameters(vpl_count=256, visibility_bias=bias, visibility_softness=softness)
     runtime = Runtime(colored_room(), TunedConfig(parameters, visibility="maps"), context=gl_context)
     captured = runtime.capture(room_view(light))
     drawn = captured.vpl_irradiance[captured.valid]
@@ -101,20 +102,19 @@ def behind_the_wall(gl_context, with_wall: bool, visibility: str) -> np.ndarray:
 
 
 def test_a_wall_stops_the_light(gl_context):
-    """A wall that covers every path stops all but 5 % of what passes without maps.
+    """A wall without thickness that stands on the floor, between VPLs and receivers, stops all light.
 
-    What is left comes from VPLs that stand low: of the four texels around a nearly level direction, those
-    that dip towards the floor meet it before the wall and cannot tell what lies behind.
+    So it does for VPLs that stand low, whose rays dip towards the floor and meet it before the wall.
     """
     passing = behind_the_wall(gl_context, True, "transmittance")
     assert passing.min() > 0.0
-    assert behind_the_wall(gl_context, True, "maps").mean() < 0.05 * passing.mean()
+    assert behind_the_wall(gl_context, True, "maps").max() == 0.0
 
 
 def test_nothing_between_leaves_light_as_it_is(gl_context):
-    """In an open, convex scene maps take nothing away: to 1e-3 of what arrives without them."""
+    """In an open, convex scene maps take nothing away, whatever their resolution."""
     free, seen = (behind_the_wall(gl_context, False, mode) for mode in ("transmittance", "maps"))
-    np.testing.assert_allclose(seen, free, rtol=1e-3)
+    np.testing.assert_array_equal(seen, free)
 
 
 @pytest.mark.parametrize("factor", [0.01, 0.1, 10.0, 100.0])
@@ -130,13 +130,10 @@ def test_scale_changes_nothing(gl_context, factor):
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_more_vpls_keep_the_mean(gl_context, light):
-    """Doubling N with visibility on moves the mean irradiance by less than 1.5 %.
-
-    Without maps the bound is 1 %; a map's texels add their own share of noise.
-    """
+    """Doubling N with visibility on moves the mean irradiance by less than 1 %, as without."""
     means = []
     for count in (1024, 2048):
         config = TunedConfig(ArtistParameters(vpl_count=count), visibility="maps")
         captured = Runtime(colored_room(), config, context=gl_context).capture(room_view(light, (96, 72)))
         means.append(captured.vpl_irradiance[captured.valid].mean())
-    assert means[1] == pytest.approx(means[0], rel=1.5e-2)
+    assert means[1] == pytest.approx(means[0], rel=1e-2)

@@ -83,7 +83,7 @@ def batch(
         typer.Option(
             metavar="SECONDS", help="For each attempt; then it is stopped.", rich_help_panel=RUN_PANEL
         ),
-    ] = 3600.0,
+    ] = 1800.0,
     memory_limit: Annotated[
         str | None,
         typer.Option(

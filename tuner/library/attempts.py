@@ -9,6 +9,9 @@ from tuner.library.record import Record
 from tuner.library.supervised_process import Limits, SupervisedProcess
 from tuner.library.tune_one import set_aside
 
+MOST_PASSED = 2
+"""Attempts that may pass a limit: a scene too large or too slow twice is so again, and others would wait."""
+
 Report = Callable[[dict[str, Any]], None]
 """Called with events: `{"event": "attempt_failed", …}`, `{"event": "stage", …}`."""
 
@@ -24,6 +27,7 @@ def tune_with_retries(process: SupervisedProcess, job: Job, limits: Limits, repo
     def progress(stage: str, share: float) -> None:
         report({"event": "stage", "key": job.key, "name": job.name, "stage": stage, "share": share})
 
+    passed = 0
     for number in range(1, limits.retries + 2):
         attempt = process.attempt(job, number, limits, progress)
         if attempt.record is not None or not attempt.failure:
@@ -38,6 +42,9 @@ def tune_with_retries(process: SupervisedProcess, job: Job, limits: Limits, repo
                 "reason": attempt.failure,
             }
         )
+        passed += attempt.limit_passed
+        if passed == MOST_PASSED:
+            break
     return set_aside(job, attempt.failure, number, attempt.seconds)
 
 

@@ -1,8 +1,10 @@
 """A whole library: what is left to do is found on disk, handed to a scheduler, and summed up."""
 
 import contextlib
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -104,8 +106,10 @@ def jobs_of(
 ) -> Library:
     """A job for each content among `scenes`, in their order; `keep`: whether digests are kept in `folder`."""
     inputs, jobs, copies = SceneInputs(folder), {}, {}
-    for name, path in scenes.items():
-        digest, size = inputs.digest(path)
+    # Hashing lets go of Python's lock: a library of many gigabytes is read by every core.
+    with ThreadPoolExecutor(os.cpu_count()) as readers:
+        digests = list(readers.map(inputs.digest, scenes.values()))
+    for (name, path), (digest, size) in zip(scenes.items(), digests, strict=True):
         key = job_key(digest, options)
         if key in jobs:
             copies[name] = jobs[key].name

@@ -10,11 +10,13 @@ import uuid
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from renderer.errors import MachineError
 from tuner.library.attempts import tune_in_own_process
 from tuner.library.job import Job
+from tuner.library.record import Records
 from tuner.library.supervised_process import Limits
 from tuner.library.tune_one import set_aside
 
@@ -118,6 +120,10 @@ def _events_of(future: "distributed.Future", job: Job, deaths: dict[str, int], l
     """What a task that ended has to tell; nothing where it is to be handed out again."""
     if future.status not in ("finished", "error"):
         return []  # lost with the scheduler, or cancelled by it
+    record = Records(Path(job.folder)).read(job.key)
+    if record is not None and record.attempts == 1:
+        # All that there is to tell, without asking a worker: a thousand of them finish hundreds a second.
+        return [{"event": "record", **asdict(record)}]
     try:
         return future.result(timeout=10.0)
     except MachineError:

@@ -56,6 +56,7 @@ class Attempt:
     record: Record | None
     failure: str
     seconds: float
+    limit_passed: bool = False
 
 
 class SupervisedProcess:
@@ -92,7 +93,7 @@ class SupervisedProcess:
             answer = self._answer(started + limits.seconds, late, limits.memory_bytes, progress)
         except _LimitPassedError as failed:
             self.close()
-            return Attempt(None, str(failed), time.perf_counter() - started)
+            return Attempt(None, str(failed), time.perf_counter() - started, limit_passed=True)
         except (EOFError, OSError):
             return Attempt(None, self._cause_of_death(), time.perf_counter() - started)
         except BaseException:

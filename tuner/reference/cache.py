@@ -20,9 +20,14 @@ from tuner.reference.reference_view import ReferenceView
 SIZE_LIMIT = 2 * 2**30
 """Bytes kept; beyond them, the entries that were not used for longest go."""
 
+LOOK_SHARE = 1 / 64
+"""Of the limit, that a process stores between two looks at the size of the folder: each asks for the size of
+every entry, and a thousand processes on one file server would do nothing else."""
+
 _SUFFIX = ".reference"
 _DIGEST_BYTES = 32
 _log = logging.getLogger(__name__)
+_stored_bytes = 0
 
 
 def cache_folder() -> Path:
@@ -54,6 +59,7 @@ def store(key: str, reference: ReferenceView) -> None:
 
     Whoever stores holds `locked(key)`.
     """
+    global _stored_bytes
     arrays = {field.name: np.asarray(getattr(reference, field.name)) for field in fields(reference)}
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)
@@ -64,7 +70,10 @@ def store(key: str, reference: ReferenceView) -> None:
             leftover.unlink(missing_ok=True)
         with written_whole(path) as temporary:
             temporary.write_bytes(_digest(key, payload) + payload)
-        _drop_oldest()
+        _stored_bytes += len(payload)
+        if _stored_bytes > LOOK_SHARE * SIZE_LIMIT:
+            _stored_bytes = 0
+            _drop_oldest()
     except (OSError, InputError) as error:
         _log.warning("references are not kept: %s", error)
 

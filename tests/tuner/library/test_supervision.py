@@ -88,6 +88,11 @@ def test_every_retry_is_made_and_the_last_reason_kept(supervised, make_job):
     assert [e["attempt"] for e in events if e["event"] == "attempt_failed"] == [1, 2, 3, 4]
 
 
+def test_a_limit_passed_twice_is_not_tried_again(supervised, make_job):
+    record = tune_with_retries(supervised, make_job("sleep"), Limits(0.3, 4 << 30, 3), lambda event: None)
+    assert (record.status, record.attempts) == ("failed", 2)
+
+
 def test_a_second_attempt_may_succeed(supervised, make_job):
     events = []
     job = make_job("second time")

@@ -2,9 +2,9 @@
 
 Every search minimises the fit's own loss over all continuous parameters that are fitted, once by drawing
 every view with the real runtime, reading it back and comparing it, and once with our surrogate in the
-runtime's place. What a search finds on the surrogate is judged by the runtime. Seconds are of tuning alone: scene,
-references, shaders and compiled functions are there before, for all. out/tuning/<scene>.json has what each
-search found and when; `python scripts/tuning_table.py` prints it as a table.
+runtime's place. What a search finds on the surrogate is judged by the runtime. Seconds are of tuning alone:
+scene, references, shaders and compiled functions are there before, for all. out/tuning/<scene>.json has what
+each search found and when; `python scripts/tuning_table.py` prints it as a table.
 """
 
 import contextlib
@@ -54,7 +54,9 @@ SCENES = (
     "bevy-depthoffieldexample",
     "bevy-mixedlightingexample",
     "cornell-box",
+    "courtyard",
     "cube2-steelribs",
+    "gallery",
     "godot-living-room",
     "godot-zdm2",
     "kajiya-cornell-box",

@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float32
 from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
 from renderer.scene import Scene
+from tuner.binned_gather import Visibility
 from tuner.captured_view import CapturedView, runtime_irradiance
 from tuner.fit_falloff import fit_falloff
 from tuner.reference import noise_floor, ray_traced_visibility
@@ -142,7 +143,7 @@ def _visibility(scene: Scene, view: CapturedView) -> Bool[np.ndarray, "receivers
 def surrogate_irradiance(
     view: CapturedView,
     parameters: ArtistParameters,
-    visibility: Bool[np.ndarray, "receivers vpls"] | None = None,
+    visibility: Visibility | None = None,
 ) -> Float32[np.ndarray, "height width 3"]:
     """The surrogate's indirect irradiance of a whole view, zero where nothing is seen."""
     receivers, vpls = gather_inputs(view.captured)

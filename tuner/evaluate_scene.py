@@ -6,6 +6,7 @@ from typing import Any
 
 from renderer.tuned_config import TunedConfig
 from renderer.views import write_views
+from tuner.error_budget import error_budget
 from tuner.evaluate import Evaluation, evaluate
 from tuner.fit_scene import default_like
 from tuner.prepare_scene import Progress, SceneOptions, Stopwatch, prepare_scene
@@ -47,6 +48,16 @@ def evaluate_scene(scene_path: Path, options: EvaluateOptions, progress: Progres
             seed=options.seed,
             progress=lambda share: progress("evaluate", share),
         )
+    budget = {}
+    if options.split_error:
+        with watch.stage("split error"):
+            budget["error_budget"] = error_budget(
+                prepared,
+                evaluation,
+                options.tuned.parameters,
+                options,
+                lambda share: progress("split error", share),
+            )
     views_path = options.views_path
     if views_path is None:
         # A report that names its views must name a file that others can read.
@@ -60,6 +71,7 @@ def evaluate_scene(scene_path: Path, options: EvaluateOptions, progress: Progres
         "metrics": evaluation.summary(),
         "seconds": {**watch.report(), "fit": 0.0},
         "status": "ok",
+        **budget,
         "ceiling_parameters": evaluation.ceiling_parameters.as_dict(),
         "per_view": evaluation.per_view(),
         "notes": list(prepared.notes),

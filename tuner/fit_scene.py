@@ -13,6 +13,7 @@ from renderer.strict_json import strict_json
 from renderer.tuned_config import TunedConfig, read_config, write_config
 from renderer.views import write_views
 from tuner.comparison_picture import write_comparison
+from tuner.error_budget import error_budget
 from tuner.evaluate import SPLITS, EvaluatedView, Evaluation, evaluate
 from tuner.fit_falloff import fit_views
 from tuner.fit_status import Descent
@@ -104,6 +105,12 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
             seed=options.seed,
             progress=lambda share: progress("evaluate", share),
         )
+    budget = {}
+    if options.split_error:
+        with watch.stage("split error"):
+            budget["error_budget"] = error_budget(
+                prepared, evaluation, tuned, options, lambda share: progress("split error", share)
+            )
     config = TunedConfig(tuned, _provenance(prepared, options, descent), options.start.visibility)
     write_views(output / "views.json", str(scene_path), tuple(view.view for view in prepared.views))
     write_comparison(
@@ -127,6 +134,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
             "curve": descent.losses.tolist(),
         },
         "uncertainty": {name: asdict(interval) for name, interval in intervals.items()},
+        **budget,
         "ceiling_parameters": evaluation.ceiling_parameters.as_dict(),
         "per_view": evaluation.per_view(),
         "notes": list(prepared.notes),

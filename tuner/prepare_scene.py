@@ -15,7 +15,7 @@ from renderer.view_placement import resolve_camera_and_lights, views_for_scene
 from renderer.views import View
 from tuner.captured_view import CapturedView, capture_views
 from tuner.compiled_functions import keep_compiled_functions
-from tuner.reference import reference_views
+from tuner.reference import ReferenceView, reference_views
 
 Progress = Callable[[str, float], None]
 
@@ -34,6 +34,7 @@ class SceneOptions:
     camera, light: in place of what the file, its sidecar or the placement would give.
     views: how many views are fitted; half as many, but at least one, are held out.
     fixed_views: these and no others; camera, light, views, seed and size then do not place any.
+    split_error: whether to split the tuned error by cause, which draws some more frames.
     """
 
     views: int = 2
@@ -43,6 +44,7 @@ class SceneOptions:
     light: Light | None = None
     size: tuple[int, int] = VIEW_SIZE
     fixed_views: tuple[View, ...] | None = None
+    split_error: bool = False
 
 
 @dataclass
@@ -93,19 +95,32 @@ def prepare_scene(
         # Before the long work: a machine without OpenGL says so at once.
         runtime = Runtime(scene, config)
     with watch.stage("reference"):
-        references = reference_views(
-            scene,
-            views,
-            seed=options.seed,
-            noise_target=NOISE_TARGET,
-            max_samples=MAX_SAMPLES,
-            bounces=1 if options.bounces == "1" else None,
-            progress=lambda _view, share: progress("reference", share),
+        references = references_of(
+            scene, views, options.seed, options.bounces, lambda share: progress("reference", share)
         )
     with watch.stage("capture"):
         progress("capture", 0.0)
         captured = capture_views(runtime, views, references)
     return PreparedScene(scene, runtime, captured, (*scene.warnings, *notes))
+
+
+def references_of(
+    scene: Scene,
+    views: tuple[View, ...],
+    seed: int,
+    bounces: Literal["1", "all"],
+    progress: Callable[[float], None] | None = None,
+) -> tuple[ReferenceView, ...]:
+    """References of `views`, as every fit and evaluation takes them."""
+    return reference_views(
+        scene,
+        views,
+        seed=seed,
+        noise_target=NOISE_TARGET,
+        max_samples=MAX_SAMPLES,
+        bounces=1 if bounces == "1" else None,
+        progress=None if progress is None else lambda _view, share: progress(share),
+    )
 
 
 def _views(scene: Scene, scene_path: Path, options: SceneOptions) -> tuple[tuple[View, ...], tuple[str, ...]]:

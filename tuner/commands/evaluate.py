@@ -20,6 +20,7 @@ from tuner.commands.options import (
     LookAtOption,
     SceneArgument,
     SeedOption,
+    SplitErrorOption,
     VisibilityOption,
     YfovOption,
 )
@@ -37,6 +38,7 @@ def evaluate(
     bounces: Annotated[
         Bounces, typer.Option(help="What to compare with: one bounce, or full global illumination.")
     ] = "1",
+    split_error: SplitErrorOption = False,
     eye: EyeOption = None,
     look_at: LookAtOption = None,
     yfov: YfovOption = None,
@@ -52,7 +54,7 @@ def evaluate(
     from rich.markup import escape
 
     from renderer.tuned_config import read_config
-    from tuner.commands.metrics_table import metrics_table
+    from tuner.commands.metrics_table import error_budget_table, metrics_table
     from tuner.commands.progress_display import shown_progress
     from tuner.commands.view_flags import ViewFlags, camera_from_flags, light_from_flags
     from tuner.evaluate_scene import EvaluateOptions, evaluate_scene
@@ -72,6 +74,7 @@ def evaluate(
         tuned=read_config(config).seen_by(visibility),
         seed=seed,
         bounces=bounces,
+        split_error=split_error,
         camera=camera_from_flags(flags),
         light=light_from_flags(flags),
         **_views(views, flags != ViewFlags()),
@@ -79,7 +82,11 @@ def evaluate(
     with shown_progress() as progress:
         document = evaluate_scene(scene, options, progress).document
     warn(tuple(document["notes"]))
-    shown = (metrics_table(document["metrics"]), f"views: {escape(document['views'])}")
+    shown = (
+        metrics_table(document["metrics"]),
+        *error_budget_table(document),
+        f"views: {escape(document['views'])}",
+    )
     return Report(document, shown, OK if document["status"] == "ok" else PARTLY_DONE)
 
 

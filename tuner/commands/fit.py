@@ -21,6 +21,7 @@ from tuner.commands.options import (
     LookAtOption,
     SceneArgument,
     SeedOption,
+    SplitErrorOption,
     ViewSizeOption,
     VisibilityOption,
     YfovOption,
@@ -45,6 +46,7 @@ def fit(
     bounces: Annotated[
         Bounces, typer.Option(help="What to fit to: one bounce, or full global illumination.")
     ] = "1",
+    split_error: SplitErrorOption = False,
     eye: EyeOption = None,
     look_at: LookAtOption = None,
     yfov: YfovOption = None,
@@ -78,6 +80,7 @@ def fit(
         views=views,
         seed=seed,
         bounces=bounces,
+        split_error=split_error,
         camera=camera_from_flags(flags),
         light=light_from_flags(flags),
         command=command_line(),
@@ -92,13 +95,14 @@ def fit(
 def _report(document: dict, output: Path) -> Report:
     from rich.markup import escape
 
-    from tuner.commands.metrics_table import metrics_table, parameters_table
+    from tuner.commands.metrics_table import error_budget_table, metrics_table, parameters_table
 
     config, picture = output / "tuned.json", output / "tuned.png"
     command = ["vpltune", "render", document["scene"], "--config", str(config), "-o", str(picture)]
     shown = (
         parameters_table(document["parameters"], document["uncertainty"]),
         metrics_table(document["metrics"]),
+        *error_budget_table(document),
         f"{escape(document['sentence'])} ({document['seconds']['total']:.1f} s)",
         f"picture: {escape(str(output / 'comparison.png'))}",
         f"next:    {escape(shlex.join(command))}",

@@ -68,5 +68,25 @@ def _sureness(interval: Mapping[str, Any] | None) -> tuple[str, str]:
     return ends, ", ".join(symbols[name] for name in interval["trades_with"])
 
 
+def error_budget_table(document: Mapping[str, Any]) -> tuple[Any, ...]:
+    """A rich table of the tuned error by cause, largest first; nothing where it was not split."""
+    from rich.table import Table
+
+    if "error_budget" not in document:
+        return ()
+    budget = document["error_budget"]
+    total = document["metrics"]["fitted"]["tuned"]["relmse"]
+    table = Table(title=f"Tuned error by cause, {budget['views']} views", title_justify="left")
+    table.add_column("", no_wrap=True)
+    for heading in ("relMSE", "share"):
+        table.add_column(heading, justify="right")
+    causes = {cause: value for cause, value in budget.items() if cause != "views"}
+    for cause in sorted(causes, key=lambda cause: (cause == "remainder", -causes[cause])):
+        share = f"{causes[cause] / total:.0%}" if total > 0.0 else "–"
+        table.add_row(cause.replace("_", " "), _number(causes[cause]), share)
+    table.add_row("all", _number(total), "100%", style="bold")
+    return (table,)
+
+
 def _number(value: Any) -> str:
     return "–" if value is None else f"{value:.3g}"

@@ -35,6 +35,9 @@ ViewSizeOption = Annotated[
     str | None,
     typer.Option("--size", metavar="WxH", help="Of the views, in pixels. [128x96]", show_default=False),
 ]
+SplitErrorOption = Annotated[
+    bool, typer.Option("--split-error", help="Split the error that is left by cause; draws some more frames.")
+]
 SeedOption = Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of everything random.")]
 
 VIEW_PANEL = "Camera and light, in world units (else: the scene's own, or chosen)"

@@ -17,6 +17,8 @@ ARGUMENTS = (
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
+    # Containers give /dev/shm 64 MB, which a long page may fill.
+    "--disable-dev-shm-usage",
 )
 
 

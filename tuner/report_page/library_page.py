@@ -89,7 +89,7 @@ def _dumbbell(row: TunedRow, axis: Axis, y: float) -> DumbbellRow:
         if (value := row.relmse[variant]) is not None and value > 0.0
     ]
     places = dict(spots)
-    name = row.name if len(row.name) <= 34 else f"…{row.name[-33:]}"
+    name = row.name if len(row.name) <= 30 else f"…{row.name[-29:]}"
     return DumbbellRow(name, round(y, 2), spots, (places["default"], places["tuned"]))
 
 

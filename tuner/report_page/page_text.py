@@ -45,8 +45,10 @@ def seconds(value: Any) -> str:
         return NONE
     if known < 60.0:
         return f"{known:.1f} s" if known >= 0.95 else f"{1000.0 * known:.0f} ms"
-    minutes = round(known / 60.0)
-    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
+    whole = round(known)
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
 
 
 def change(before: Any, after: Any) -> str:

@@ -56,7 +56,7 @@ def test_durations_and_changes_in_words():
         "12 ms",
         "1.0 s",
         "59.9 s",
-        "1 min",
+        "1 min 01 s",
         "2 h 01 min",
         NONE,
         NONE,

@@ -63,6 +63,7 @@ def test_exposure_is_live_on_linear_values(chromium, page_path, pictures):
     """Every canvas shows what the numpy twin of the tone curve makes of the half floats on disk."""
     exposures = view_block(pictures[0], {}).linear["exposures"]
     with opened(chromium, page_path) as shown:
+        shown.page.select_option("#layout", "side")
         for quantity, stops, words in (
             ("picture", 0, "±0.0 EV"),
             ("picture", 2.5, "+2.5 EV"),
@@ -212,7 +213,13 @@ def test_no_width_needs_scrolling_sideways(chromium, page_path, width):
 
 def test_in_print_sliders_lie_side_by_side(chromium, page_path):
     with opened(chromium, page_path) as shown:
+        shown.page.locator("#exposure").fill("2")
+        shown.drawn("picture 2")
         shown.page.emulate_media(media="print")
+        # On paper every picture has the exposure, those too that were not seen on the screen.
+        drawn = ".view canvas:not([data-drawn='picture 2'])"
+        shown.page.wait_for_function("drawn => !document.querySelector(drawn)", arg=drawn)
+        assert shown.page.locator(".view canvas").count() == 10
         stack = shown.page.locator(".stack").first
         assert all(figure.is_visible() for figure in stack.locator("figure").all())
         clip = stack.locator("figure.right canvas").evaluate("canvas => getComputedStyle(canvas).clipPath")

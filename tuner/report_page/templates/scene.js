@@ -22,26 +22,28 @@ async function unpacked(text) {
   return values;
 }
 
-// Khronos PBR Neutral (2024); twin of shaders/tone_mapping.comp.
-function toneCurve(color) {
+// Khronos PBR Neutral (2024), from `shown` to itself; twin of shaders/tone_mapping.comp.
+function toneCurve(shown) {
   const start = 0.8 - 0.04, desaturation = 0.15;
-  const low = Math.min(...color), offset = low < 0.08 ? low - 6.25 * low * low : 0.04;
-  const shifted = color.map((value) => value - offset), peak = Math.max(...shifted);
-  if (peak < start) return shifted;
+  const low = Math.min(shown[0], shown[1], shown[2]), offset = low < 0.08 ? low - 6.25 * low * low : 0.04;
+  for (let c = 0; c < 3; c++) shown[c] -= offset;
+  const peak = Math.max(shown[0], shown[1], shown[2]);
+  if (peak < start) return;
   const room = 1 - start, newPeak = 1 - (room * room) / (peak + room - start);
   const towardsWhite = 1 - 1 / (desaturation * (peak - newPeak) + 1);
-  return shifted.map((value) => (value * newPeak) / peak * (1 - towardsWhite) + newPeak * towardsWhite);
+  for (let c = 0; c < 3; c++) shown[c] = ((shown[c] * newPeak) / peak) * (1 - towardsWhite) + newPeak * towardsWhite;
 }
 
-// IEC 61966-2-1.
-function srgbEncode(value) {
-  const clamped = Math.min(Math.max(value, 0), 1);
-  return clamped <= 0.0031308 ? 12.92 * clamped : 1.055 * clamped ** (1 / 2.4) - 0.055;
-}
+// IEC 61966-2-1, in 8 bits, by the square root of the linear value: evenly enough spaced for 4,096 entries.
+const SRGB = Uint8Array.from({ length: 4096 }, (_, index) => {
+  const linear = (index / 4095) ** 2;
+  return Math.round(255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055));
+});
+const srgbEncode = (linear) => SRGB[Math.round(4095 * Math.sqrt(Math.min(Math.max(linear, 0), 1)))];
 
 class View {
-  constructor(article, linear) {
-    Object.assign(this, { article, linear, planes: {}, radiance: {} });
+  constructor(article, linear, near) {
+    Object.assign(this, { article, linear, near, planes: {}, radiance: {} });
     this.panes = all("figure[data-variant] img", article).filter((image) => image.closest(".stack")).map((image) => {
       const canvas = document.createElement("canvas");
       canvas.width = linear.width;
@@ -75,19 +77,29 @@ class View {
     }
   }
 
-  draw(quantity, stops) {
-    const exposure = this.linear.exposures[quantity] * 2 ** stops;
+  // What is out of sight waits for its turn, so that exposure stays live however many views there are.
+  draw(quantity, stops, everything) {
+    const state = `${quantity} ${stops}`;
     for (const canvas of this.panes) {
-      const variant = canvas.dataset.variant;
-      const source = quantity === "picture" ? this.radiance[variant] : this.planes[`${variant}_indirect`];
-      const image = new ImageData(this.linear.width, this.linear.height);
-      for (let i = 0, j = 0; i < source.length; i += 3, j += 4) {
-        const shown = toneCurve([source[i] * exposure, source[i + 1] * exposure, source[i + 2] * exposure]);
-        for (let c = 0; c < 3; c++) image.data[j + c] = Math.round(255 * srgbEncode(shown[c]));
-        image.data[j + 3] = 255;
-      }
-      canvas.getContext("2d").putImageData(image, 0, 0);
+      const wanted = everything || (this.near && canvas.checkVisibility({ visibilityProperty: true }));
+      if (!wanted || canvas.dataset.drawn === state) continue;
+      this.paint(canvas, quantity, stops);
+      canvas.dataset.drawn = state;
     }
+  }
+
+  paint(canvas, quantity, stops) {
+    const exposure = this.linear.exposures[quantity] * 2 ** stops, shown = new Float64Array(3);
+    const variant = canvas.dataset.variant;
+    const source = quantity === "picture" ? this.radiance[variant] : this.planes[`${variant}_indirect`];
+    const image = new ImageData(this.linear.width, this.linear.height);
+    for (let i = 0, j = 0; i < source.length; i += 3, j += 4) {
+      for (let c = 0; c < 3; c++) shown[c] = source[i + c] * exposure;
+      toneCurve(shown);
+      for (let c = 0; c < 3; c++) image.data[j + c] = srgbEncode(shown[c]);
+      image.data[j + 3] = 255;
+    }
+    canvas.getContext("2d").putImageData(image, 0, 0);
   }
 
   // Luminance of indirect irradiance under the pointer, in every variant.
@@ -116,13 +128,13 @@ async function start() {
   const toolbar = one(".toolbar");
   if (!toolbar || typeof DecompressionStream === "undefined") return;
   const linear = JSON.parse(one("#linear").textContent);
-  const views = all(".view").map((article, index) => new View(article, linear[index]));
+  const views = all(".view").map((article, index) => new View(article, linear[index], index === 0));
   const exposure = one("#exposure"), quantity = one("#quantity"), output = one(".exposure output");
   let waiting = false;
 
-  const draw = () => {
+  const draw = (everything = false) => {
     waiting = false;
-    views.forEach((view) => view.draw(quantity.value, Number(exposure.value)));
+    views.forEach((view) => view.draw(quantity.value, Number(exposure.value), everything === true));
     document.documentElement.dataset.drawn = `${quantity.value} ${exposure.value}`;
   };
   const redraw = () => {
@@ -144,7 +156,12 @@ async function start() {
     document.documentElement.classList.toggle("side", one("#layout").value !== "slider");
     document.documentElement.classList.toggle("sharp", one("#sharp").checked);
     all(".split").forEach((split) => split.dispatchEvent(new Event("input")));
+    draw();
   };
+  const watch = new IntersectionObserver((entries) => {
+    for (const { target, isIntersecting } of entries) views[Number(target.dataset.view)].near = isIntersecting;
+    draw();
+  }, { rootMargin: "100%" });
 
   exposure.addEventListener("input", redraw);
   quantity.addEventListener("change", redraw);
@@ -156,6 +173,10 @@ async function start() {
   toolbar.addEventListener("submit", (event) => event.preventDefault());
   await Promise.all(views.map((view) => view.load()));
   toolbar.hidden = false;
+  views.forEach((view) => watch.observe(view.article));
+  // Paper shows every picture.
+  addEventListener("beforeprint", () => draw(true));
+  matchMedia("print").addEventListener("change", (change) => change.matches && draw(true));
   arrange();
   redraw();
 }

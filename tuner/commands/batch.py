@@ -12,6 +12,7 @@ import typer
 from renderer.errors import InputError
 from tuner.commands.options import (
     LARGEST_VIEW_COUNT,
+    SCENE_SECONDS,
     Bounces,
     JsonOption,
     SeedOption,
@@ -83,7 +84,7 @@ def batch(
         typer.Option(
             metavar="SECONDS", help="For each attempt; then it is stopped.", rich_help_panel=RUN_PANEL
         ),
-    ] = 1800.0,
+    ] = SCENE_SECONDS,
     memory_limit: Annotated[
         str | None,
         typer.Option(

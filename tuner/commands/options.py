@@ -17,6 +17,9 @@ LARGEST_SIDE = 16384
 
 LARGEST_VIEW_COUNT = 64
 
+SCENE_SECONDS = 900.0
+"""That a batch gives an attempt at one scene: many times what the slowest we know takes."""
+
 Layer = Literal["final", "direct", "indirect", "irradiance", "albedo", "normal", "depth"]
 Motion = Literal["auto", "none", "light", "camera", "both"]
 Bounces = Literal["1", "all"]

@@ -25,7 +25,7 @@ from typing import Literal
 
 from renderer.atomic_file import write_text_whole
 from renderer.errors import InputError
-from tuner.reference.cache import cache_folder
+from tuner.reference.cache import cache_folder, locked
 
 LIBRARIES_TRIED = 4
 PROBE_SECONDS = 60.0
@@ -92,15 +92,29 @@ def _chosen_variant(forced: str | None, named_library: str | None) -> MitsubaVar
     libraries = [named_library] if named_library else [*map(str, llvm_libraries()[:LIBRARIES_TRIED]), None]
     path = cache_folder() / "mitsuba_variant.json"
     key = _machine_key(libraries)
-    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
-        kept = json.loads(path.read_text(encoding="utf-8"))
-        if kept["key"] == key:
-            return MitsubaVariant(**kept["variant"])
-    variant, certain = _probed_variant(libraries)
-    if certain:
+    kept = _kept_variant(path, key)
+    if kept is not None:
+        return kept
+    with locked("mitsuba_variant"):
+        # Another process may have found it meanwhile.
+        kept = _kept_variant(path, key)
+        if kept is not None:
+            return kept
+        variant, certain = _probed_variant(libraries)
         with contextlib.suppress(OSError, InputError):
-            write_text_whole(path, json.dumps({"key": key, "variant": asdict(variant)}) + "\n")
+            for leftover in path.parent.glob(f".{path.stem}-*"):  # of a process killed while it wrote
+                leftover.unlink()
+            if certain:
+                write_text_whole(path, json.dumps({"key": key, "variant": asdict(variant)}) + "\n")
     return variant
+
+
+def _kept_variant(path: Path, key: str) -> MitsubaVariant | None:
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        return MitsubaVariant(**kept["variant"]) if kept["key"] == key else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
 
 
 def llvm_libraries() -> list[Path]:

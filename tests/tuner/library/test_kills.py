@@ -65,7 +65,7 @@ def kill_tree(process):
     for member in members:
         with contextlib.suppress(psutil.NoSuchProcess):
             member.send_signal(signal.SIGKILL)
-    process.wait()
+    process.communicate()
     psutil.wait_procs(members[1:], timeout=10.0)
 
 

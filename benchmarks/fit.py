@@ -62,7 +62,7 @@ def _fit_seconds(folder: Path) -> float:
 
 def _step_milliseconds() -> tuple[float, float]:
     """Median milliseconds of one value and gradient, reduced and pairwise, taken in turn."""
-    receivers, vpls = _corner(np.random.default_rng(0))
+    receivers, vpls = corner(np.random.default_rng(0), RECEIVERS, VPLS)
     start = FalloffParameters(*map(jnp.float32, (1.0, 0.5, 0.1)))
     binned = bin_vpls(receivers, vpls)
     truth = np.asarray(gather_binned(binned, FalloffParameters(*map(jnp.float32, (0.8, 1.0, 0.3)))))
@@ -90,20 +90,24 @@ def _step_milliseconds() -> tuple[float, float]:
     return float(np.median(times["reduced"][1:])), float(np.median(times["pairwise"][1:]))
 
 
-def _corner(random: np.random.Generator) -> tuple[Receivers, VirtualPointLights]:
+def corner(
+    random: np.random.Generator, receiver_count: int, vpl_count: int
+) -> tuple[Receivers, VirtualPointLights]:
     """Receivers on a floor, VPLs on the two walls that meet it, all of size 2 L."""
-    floor = np.concatenate([random.uniform(0.0, 2.0, (RECEIVERS, 2)), np.zeros((RECEIVERS, 1))], axis=1)
-    wall = np.concatenate([np.zeros((VPLS, 1)), random.uniform(0.0, 2.0, (VPLS, 2))], axis=1)
-    on_other = np.arange(VPLS) % 2 == 1
+    floor = np.concatenate(
+        [random.uniform(0.0, 2.0, (receiver_count, 2)), np.zeros((receiver_count, 1))], axis=1
+    )
+    wall = np.concatenate([np.zeros((vpl_count, 1)), random.uniform(0.0, 2.0, (vpl_count, 2))], axis=1)
+    on_other = np.arange(vpl_count) % 2 == 1
     wall[on_other] = wall[on_other][:, [1, 0, 2]]
     normals = np.where(on_other[:, None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
-    flux = random.uniform(0.5, 1.5, (VPLS, 3)) / VPLS
-    footprint = np.sqrt(8.0 / VPLS / np.pi) * random.uniform(0.5, 2.0, VPLS)
+    flux = random.uniform(0.5, 1.5, (vpl_count, 3)) / vpl_count
+    footprint = np.sqrt(8.0 / vpl_count / np.pi) * random.uniform(0.5, 2.0, vpl_count)
 
     def array(values: np.ndarray) -> jax.Array:
         return jnp.asarray(values, jnp.float32)
 
-    up = np.tile([0.0, 0.0, 1.0], (RECEIVERS, 1))
+    up = np.tile([0.0, 0.0, 1.0], (receiver_count, 1))
     return (
         Receivers(array(floor), array(up)),
         VirtualPointLights(array(wall), array(normals), array(footprint), array(flux)),

@@ -19,15 +19,15 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from tuner.virtual_point_lights import Receivers, VirtualPointLights
-from tuner.vpl_gather import FalloffParameters, pair_geometry
+from tuner.vpl_gather import FalloffParameters, pair_geometry, receivers_at_once
 
 Visibility = Bool[np.ndarray, "receivers vpls"] | Float[Array, "receivers vpls"]
 """Share of each VPL's light that reaches each receiver, in [0, 1]."""
 
 DISTANCE_NODES = 24
 FOOTPRINT_NODES = 8
-CHUNK = 256
-"""Receivers binned at once: 256 × 1,024 pairs are 1 MiB an array."""
+PAIRS_AT_ONCE = 2**18
+"""Receivers times VPLs that are binned in one go: 1 MiB an array."""
 # Below a tenth of the smallest footprint, 1/(d² + α²l²) has gone flat for any α that is not tiny.
 _NEAREST_IN_FOOTPRINTS = 0.1
 
@@ -65,10 +65,11 @@ def bin_vpls(
         axis=1,
     )
     count = receivers.position.shape[0]
-    padding = ((0, -count % CHUNK), (0, 0))
+    chunk_size = receivers_at_once(vpls.position.shape[0], PAIRS_AT_ONCE)
+    padding = ((0, -count % chunk_size), (0, 0))
 
     def chunked(values: np.ndarray | Array) -> Array:
-        return jnp.pad(jnp.asarray(values), padding).reshape(-1, CHUNK, values.shape[1])
+        return jnp.pad(jnp.asarray(values), padding).reshape(-1, chunk_size, values.shape[1])
 
     sums = _bin_chunks(
         chunked(receivers.position),

@@ -5,6 +5,7 @@ Keller 1997 (instant radiosity), with the point spread over its footprint: 1/d²
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -13,8 +14,8 @@ from jaxtyping import Array, Bool, Float
 from renderer.artist_parameters import ArtistParameters
 from tuner.virtual_point_lights import Receivers, VirtualPointLights
 
-RECEIVER_CHUNK = 512
-"""Receivers gathered at once: 512 × 1,024 pairs are 2 MiB an array, which stays in a core's cache."""
+PAIRS_AT_ONCE = 2**19
+"""Receivers times VPLs in one go: 2 MiB an array, which stays in a core's cache, for any number of VPLs."""
 
 
 @jax.tree_util.register_dataclass
@@ -87,6 +88,11 @@ def pair_geometry(
     return squared, jnp.maximum(towards_vpl, 0.0) * jnp.maximum(towards_receiver, 0.0) / squared
 
 
+def receivers_at_once(vpls: int, pairs: int) -> int:
+    """How many receivers' pairs with all VPLs are about `pairs`: a power of two, at least 1."""
+    return 2 ** max((pairs // max(vpls, 1)).bit_length() - 1, 0)
+
+
 def gather(
     receivers: Receivers,
     vpls: VirtualPointLights,
@@ -102,12 +108,15 @@ def gather(
             runtime does without visibility maps.
     """
     count = receivers.position.shape[0]
-    chunks = -(-count // RECEIVER_CHUNK)
-    padding = ((0, chunks * RECEIVER_CHUNK - count), (0, 0))
+    chunk_size = receivers_at_once(vpls.position.shape[0], PAIRS_AT_ONCE)
+    padding = ((0, -count % chunk_size), (0, 0))
 
     def chunked(values: Array) -> Array:
-        return jnp.pad(values, padding).reshape(chunks, RECEIVER_CHUNK, values.shape[1])
+        return jnp.pad(values, padding).reshape(-1, chunk_size, values.shape[1])
 
+    # Made anew for its gradient: kept, all pairs of all chunks would be written out and read back, which took
+    # forty times as long and memory that grows with their number.
+    @partial(jax.checkpoint, prevent_cse=False)
     def gather_chunk(chunk: tuple[Array, Array, Array | None]) -> Array:
         position, normal, visible = chunk
         squared, cosines = pair_geometry(Receivers(position, normal), vpls)

@@ -7,6 +7,7 @@ import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
 from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
+from benchmarks.fit import corner
 from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
 from renderer.scene import Camera, Light, look_at
@@ -16,7 +17,7 @@ from renderer.view_placement import resolve_camera_and_lights
 from renderer.views import View
 from tuner.binned_gather import bin_vpls, gather_binned
 from tuner.virtual_point_lights import gather_inputs
-from tuner.vpl_gather import FalloffParameters, gather, gather_pairwise
+from tuner.vpl_gather import PAIRS_AT_ONCE, FalloffParameters, gather, gather_pairwise, receivers_at_once
 
 PARAMETERS = (
     ArtistParameters(),
@@ -118,3 +119,21 @@ def test_nothing_lit_is_finite():
     assert not np.asarray(
         gather_binned(bin_vpls(receivers, vpls), FalloffParameters.of(ArtistParameters()))
     ).any()
+
+
+@pytest.mark.parametrize("vpls", [1, 3, 1_000, 70_000, 2**21])
+def test_pairs_at_once_are_bounded(vpls):
+    """Never more than asked for, unless one receiver alone has more; never fewer than a quarter of it."""
+    receivers = receivers_at_once(vpls, PAIRS_AT_ONCE)
+    assert receivers >= 1
+    assert receivers == 1 or PAIRS_AT_ONCE / 4 < receivers * vpls <= PAIRS_AT_ONCE
+
+
+def test_chunks_do_not_show():
+    """Few receivers and very many VPLs are gathered and binned as they are in one piece."""
+    random = np.random.default_rng(5)
+    receivers, vpls = corner(random, 37, 20_000)
+    parameters = FalloffParameters.of(ArtistParameters())
+    exact = np.asarray(gather_pairwise(receivers, vpls, parameters))
+    assert relative_rms(np.asarray(gather(receivers, vpls, parameters)), exact) < 1e-5
+    assert relative_rms(np.asarray(gather_binned(bin_vpls(receivers, vpls), parameters)), exact) < 6e-3

@@ -32,6 +32,29 @@ def truthful_clock(renderer_name: str) -> Clock:
     return "wall" if any(software in name for software in _SOFTWARE_RENDERERS) else "gpu"
 
 
+def frame_milliseconds(
+    context: moderngl.Context, draw: Callable[[], object], frames: int, clock: Clock | None = None
+) -> float:
+    """Milliseconds of a whole frame, from an idle GPU until it is finished: the median of `frames`.
+
+    Passes overlap as they do outside of measurements. `clock` None takes the truthful one.
+    """
+    chosen = truthful_clock(str(context.info["GL_RENDERER"])) if clock is None else clock
+    taken = []
+    for _ in range(frames):
+        context.finish()
+        start = time.perf_counter()
+        if chosen == "gpu":
+            with context.query(time=True) as query:
+                draw()
+            taken.append(query.elapsed * 1e-6)
+        else:
+            draw()
+            context.finish()
+            taken.append(1e3 * (time.perf_counter() - start))
+    return statistics.median(taken)
+
+
 class FrameTiming:
     """Times the passes of `frame` from entering the block to leaving it.
 

@@ -14,7 +14,7 @@ from renderer.artist_parameters import ArtistParameters
 from renderer.capture import CapturedFrame, capture_frame, read_picture
 from renderer.dynamic_lights import DynamicLights
 from renderer.frame import Frame, frame_light_records
-from renderer.frame_timing import FrameTiming
+from renderer.frame_timing import FrameTiming, frame_milliseconds
 from renderer.gpu_context import check_errors, create_context, free_dropped
 from renderer.light_faces import face_count
 from renderer.ray_hierarchy import RayHierarchy
@@ -161,6 +161,12 @@ class Runtime:
                 self.draw(view, lights=lights)
                 timing.end_frame()
         return timing.milliseconds()
+
+    @_on_own_context
+    def frame_milliseconds(self, view: View, frames: int = 5, lights: DynamicLights | None = None) -> float:
+        """Milliseconds of a whole frame, the median of `frames` frames after one that is not timed."""
+        self.draw(view, lights=lights)
+        return frame_milliseconds(self._context, lambda: self.draw(view, lights=lights), frames)
 
     @_on_own_context
     def exposure(self) -> float:

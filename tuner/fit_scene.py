@@ -2,7 +2,7 @@
 
 import importlib.metadata
 import platform
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +12,18 @@ from renderer.errors import InputError
 from renderer.strict_json import strict_json
 from renderer.tuned_config import TunedConfig, read_config, write_config
 from renderer.views import write_views
+from tuner.captured_view import CapturedView, capture_views
 from tuner.comparison_picture import write_comparison
 from tuner.error_budget import error_budget
 from tuner.evaluate import SPLITS, EvaluatedView, Evaluation, evaluate
+from tuner.fit_budget import BudgetOptions, fit_to_budget
+from tuner.fit_density import density_document, fit_density
 from tuner.fit_falloff import fit_views
 from tuner.fit_status import Descent
 from tuner.prepare_scene import PreparedScene, Progress, SceneOptions, Stopwatch, prepare_scene
 from tuner.reference.content_key import scene_digest
-from tuner.uncertainty import fit_with_intervals
+from tuner.search_space import SearchSpace
+from tuner.uncertainty import Interval, fit_with_intervals, intervals
 from tuner.view_pictures import write_view_pictures
 
 PANEL_HEIGHT = 240
@@ -30,10 +34,14 @@ PANEL_HEIGHT = 240
 class FitOptions(SceneOptions):
     """`start`: where the fit begins, and what the parameters that are not fitted stay at.
 
+    density: fit to several rotations of the point table, and where the VPLs stand with it.
+    budget: fit to a frame's time, the count and how the frame is drawn with it; see `tuner.fit_budget`.
     command: what was typed, for the record; None where the fit was asked for from Python.
     """
 
     start: TunedConfig = field(default_factory=TunedConfig)
+    density: bool = False
+    budget: BudgetOptions | None = None
     command: str | None = None
 
 
@@ -88,19 +96,15 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
     if output.exists() and not output.is_dir():
         raise InputError(f"{output}: the output must be a folder, and is a file")
     prepared = prepare_scene(scene_path, options, options.start, watch, progress)
-    fitted = tuple(view for view in prepared.views if view.view.split == "fitted")
+    default = default_like(options.start.parameters)
     with watch.stage("fit"):
-        tuned, descent, intervals = fit_with_intervals(
-            fit_views(fitted, options.start.parameters, seed=options.seed),
-            options.start.parameters,
-            progress=lambda share: progress("fit", share),
-        )
+        tuned, descent, known, views, found = _fitted(prepared, options, output, progress)
     with watch.stage("evaluate"):
         evaluation = evaluate(
             prepared.scene,
             prepared.runtime,
-            prepared.views,
-            default_like(options.start.parameters),
+            views,
+            replace(default, vpl_count=tuned.vpl_count),
             tuned,
             seed=options.seed,
             progress=lambda share: progress("evaluate", share),
@@ -133,11 +137,12 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
             "steps": len(descent.losses) - 1,
             "curve": descent.losses.tolist(),
         },
-        "uncertainty": {name: asdict(interval) for name, interval in intervals.items()},
+        "uncertainty": {name: asdict(interval) for name, interval in known.items()},
         **budget,
         "ceiling_parameters": evaluation.ceiling_parameters.as_dict(),
         "per_view": evaluation.per_view(),
         "notes": list(prepared.notes),
+        **found,
         "provenance": {
             **config.provenance,
             "python": platform.python_version(),
@@ -148,6 +153,43 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
     }
     write_text_whole(output / "metrics.json", strict_json(document) + "\n")
     return FitResult(config, descent, evaluation, prepared.notes, document)
+
+
+def _fitted(
+    prepared: PreparedScene, options: FitOptions, output: Path, progress: Progress
+) -> tuple[ArtistParameters, Descent, dict[str, Interval], tuple[CapturedView, ...], dict[str, Any]]:
+    """Parameters, how the fit ended, their intervals, views captured for them, what metrics.json gains."""
+    views, start, seed = _of_fitted(prepared.views), options.start.parameters, options.seed
+
+    def report(share: float) -> None:
+        progress("fit", share)
+
+    if options.budget is not None:
+        tuned, descent, found = fit_to_budget(
+            prepared, options.start, options.budget, output, seed=seed, progress=report
+        )
+    elif options.density:
+        density = fit_density(prepared.runtime, views, start, seed=seed, progress=report)
+        tuned, descent = density.parameters, density.descent
+        document = density_document(prepared.runtime, views, default_like(start), density, seed)
+        found = {"density": document}
+    else:
+        ready = fit_views(views, start, seed=seed)
+        tuned, descent, known = fit_with_intervals(ready, start, progress=report)
+        return tuned, descent, known, prepared.views, {}
+    # The VPLs are others now, in number and in place.
+    prepared.runtime.parameters = tuned
+    references = tuple(view.reference for view in prepared.views)
+    captured = capture_views(prepared.runtime, tuple(view.view for view in prepared.views), references)
+    if descent.status.failed:
+        return tuned, descent, {}, captured, found
+    # Of one rotation: several of one view err together, and would pass for so many witnesses.
+    ready = fit_views(_of_fitted(captured), tuned, seed=seed)
+    return tuned, descent, intervals(ready, tuned, frozenset(SearchSpace().names)), captured, found
+
+
+def _of_fitted(views: tuple[CapturedView, ...]) -> tuple[CapturedView, ...]:
+    return tuple(view for view in views if view.view.split == "fitted")
 
 
 def default_like(start: ArtistParameters) -> ArtistParameters:

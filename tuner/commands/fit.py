@@ -43,6 +43,30 @@ def fit(
     size: ViewSizeOption = None,
     seed: SeedOption = 0,
     visibility: VisibilityOption = None,
+    vpl_count: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=65536,
+            help="How many VPLs to fit for; up to 256, their density is fitted too, over several rotations.",
+            show_default=False,
+        ),
+    ] = None,
+    budget_ms: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MS",
+            help="Choose VPL count and density for frames of this time on this machine.",
+            show_default=False,
+        ),
+    ] = None,
+    pareto: Annotated[
+        bool, typer.Option("--pareto", help="Write the whole front of error against frame time.")
+    ] = False,
+    frame_size: Annotated[
+        str | None,
+        typer.Option(metavar="WxH", help="Of the frames that are timed. [--size]", show_default=False),
+    ] = None,
     bounces: Annotated[
         Bounces, typer.Option(help="What to fit to: one bounce, or full global illumination.")
     ] = "1",
@@ -60,8 +84,10 @@ def fit(
 ) -> Report:
     """Fit a scene: write DIR/tuned.json, views.json, metrics.json, and pictures before and after."""
     from renderer.tuned_config import read_config
+    from tuner.commands.budget_flags import budget_from_flags, with_vpl_count
     from tuner.commands.progress_display import shown_progress
     from tuner.commands.view_flags import ViewFlags, camera_from_flags, light_from_flags
+    from tuner.fit_density import FEW_VPLS
     from tuner.fit_scene import FitOptions, fit_scene
 
     flags = ViewFlags(
@@ -75,8 +101,11 @@ def fit(
         light_intensity,
         light_cone,
     )
+    start = with_vpl_count(read_config(config).seen_by(visibility), vpl_count)
     options = FitOptions(
-        start=read_config(config).seen_by(visibility),
+        start=start,
+        density=vpl_count is not None and vpl_count <= FEW_VPLS,
+        budget=budget_from_flags(vpl_count, budget_ms, pareto, frame_size),
         views=views,
         seed=seed,
         bounces=bounces,
@@ -95,6 +124,7 @@ def fit(
 def _report(document: dict, output: Path) -> Report:
     from rich.markup import escape
 
+    from tuner.commands.budget_flags import budget_lines
     from tuner.commands.metrics_table import error_budget_table, metrics_table, parameters_table
 
     config, picture = output / "tuned.json", output / "tuned.png"
@@ -104,6 +134,7 @@ def _report(document: dict, output: Path) -> Report:
         metrics_table(document["metrics"]),
         *error_budget_table(document),
         f"{escape(document['sentence'])} ({document['seconds']['total']:.1f} s)",
+        *budget_lines(document),
         f"picture: {escape(str(output / 'comparison.png'))}",
         f"next:    {escape(shlex.join(command))}",
         f"report:  {escape(shlex.join(('vpltune', 'report', str(output))))}",

@@ -1,0 +1,191 @@
+"""Fits where few VPLs stand, with all else, to the error that a finite number of them leaves.
+
+Every correctly weighted density has the same mean picture, so none can be learned from it. What is fitted is
+the mean of the loss over several rotations of the point table (Cranley and Patterson 1976), the same ones for
+every candidate (common random numbers): it holds the bias of the falloff and the variance of the placement,
+and at few VPLs the best α, k and κ are others than at many.
+
+For each candidate (γ, η) the falloff is fitted anew, which takes microseconds a step. Over (γ, η) itself the
+loss is measured in the runtime and searched by response surface (Box and Wilson 1951): as density shifts,
+VPLs cross edges and corners, and the loss is rough at the scale of a gradient's step while its broad shape is
+smooth (`vpltune bench density`, row `density_slope_agreement`).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from renderer.artist_parameters import ArtistParameters
+from renderer.runtime import Runtime
+from tuner.captured_view import CapturedView
+from tuner.fit_falloff import fit_falloff
+from tuner.fit_status import Descent
+from tuner.losses.relative_squared_error import DARK_SHARE
+
+ROTATIONS = 8
+"""Of each view. The first is none at all, which is the one that the runtime draws with."""
+HELD_OUT_ROTATIONS = 8
+FEW_VPLS = 256
+"""Up to this many, the fit sees several rotations and the density is fitted; beyond, one placement is as good
+as any other."""
+_GRID = (0.0, 0.5, 1.0)
+_SURFACE_STEPS = 21
+
+Rotation = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class DensityTrial:
+    """One candidate: its densities, and the loss that was left after fitting the falloff."""
+
+    density_exponent: float
+    density_importance: float
+    loss: float
+
+
+@dataclass(frozen=True, eq=False)
+class DensityFit:
+    """The best candidate met, and all that were measured."""
+
+    parameters: ArtistParameters
+    descent: Descent
+    trials: tuple[DensityTrial, ...]
+
+
+def table_rotations(count: int, seed: int, *, held_out: bool = False) -> tuple[Rotation, ...]:
+    """`count` rotations of the point table; those that are held out share none with the others."""
+    random = np.random.default_rng([seed, int(held_out)])
+    drawn = [tuple(float(x) for x in pair) for pair in random.random((count, 2))]
+    return tuple(drawn) if held_out else ((0.0, 0.0), *drawn[1:])
+
+
+def rotated_views(
+    runtime: Runtime,
+    views: Sequence[CapturedView],
+    parameters: ArtistParameters,
+    rotations: Sequence[Rotation],
+) -> tuple[CapturedView, ...]:
+    """Every view drawn with `parameters` at every rotation, against its one reference."""
+    runtime.parameters = parameters
+    return tuple(
+        CapturedView(view.view, view.reference, runtime.capture(view.view, rotation))
+        for view in views
+        for rotation in rotations
+    )
+
+
+def rotation_errors(
+    runtime: Runtime,
+    views: Sequence[CapturedView],
+    parameters: ArtistParameters,
+    rotations: Sequence[Rotation],
+) -> Float[np.ndarray, "views rotations"]:
+    """relMSE of the runtime's own picture, free of the reference's noise, by view and rotation."""
+    rotated = rotated_views(runtime, views, parameters, rotations)
+    return np.array([_relmse(view) for view in rotated]).reshape(len(views), len(rotations))
+
+
+def fit_density(
+    runtime: Runtime,
+    views: Sequence[CapturedView],
+    start: ArtistParameters,
+    *,
+    seed: int = 0,
+    rotations: Sequence[Rotation] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> DensityFit:
+    """Density and falloff for `start.vpl_count` VPLs, robust over rotations of the point table.
+
+    Args:
+        runtime: of the views' scene; draws every candidate. Its parameters are a candidate's afterwards.
+        views: what to fit to, with references.
+        start: the count, where the falloff's fit begins, and what is not fitted.
+        seed: of rotations and pixels.
+        rotations: what to fit to; None takes `ROTATIONS` of them.
+        progress: called with the share done, in [0, 1].
+    """
+    chosen = table_rotations(ROTATIONS, seed) if rotations is None else tuple(rotations)
+    fits: dict[tuple[float, float], tuple[ArtistParameters, Descent]] = {}
+    # The start itself is a candidate: the result is never worse than a fit of the falloff alone.
+    grid = [(start.density_exponent, start.density_importance)]
+    grid += [(exponent, importance) for exponent in _GRID for importance in _GRID]
+    grid = list(dict.fromkeys(grid))
+
+    def measure(densities: tuple[float, float]) -> None:
+        candidate = replace(start, density_exponent=densities[0], density_importance=densities[1])
+        captured = rotated_views(runtime, views, candidate, chosen)
+        fits[densities] = fit_falloff(captured, candidate, seed=seed)
+        if progress is not None:
+            progress(len(fits) / (len(grid) + 1))
+
+    for densities in grid:
+        measure(densities)
+        if fits[densities][1].status.failed:
+            # Nothing lit, or not finite: no density will mend it.
+            return DensityFit(start, fits[densities][1], _trials(fits))
+    lowest = response_minimum(_trials(fits))
+    if lowest not in fits:
+        measure(lowest)
+    best = min(fits, key=lambda densities: fits[densities][1].loss)
+    parameters, descent = fits[best]
+    return DensityFit(parameters, descent, _trials(fits))
+
+
+def response_minimum(trials: Sequence[DensityTrial]) -> tuple[float, float]:
+    """Where the quadratic through log losses, by least squares, is least in the unit square."""
+    points = np.array([(trial.density_exponent, trial.density_importance) for trial in trials])
+    # A fit without the reference's noise may end at or below 0; the floor keeps the logarithm finite.
+    losses = np.array([trial.loss for trial in trials])
+    logs = np.log(np.maximum(losses, 1e-3 * np.abs(losses).max() + 1e-30))
+    coefficients, *_ = np.linalg.lstsq(_quadratic(points), logs, rcond=None)
+    axis = np.linspace(0.0, 1.0, _SURFACE_STEPS)
+    square = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1).reshape(-1, 2)
+    exponent, importance = square[np.argmin(_quadratic(square) @ coefficients)]
+    return float(exponent), float(importance)
+
+
+def density_document(
+    runtime: Runtime,
+    views: Sequence[CapturedView],
+    default: ArtistParameters,
+    fit: DensityFit,
+    seed: int,
+) -> dict[str, Any]:
+    """What metrics.json says of it: the trials, and both errors on rotations that were not fitted to."""
+    rotations = table_rotations(HELD_OUT_ROTATIONS, seed, held_out=True)
+    errors = {
+        name: float(rotation_errors(runtime, views, parameters, rotations).mean())
+        for name, parameters in (("default", default), ("tuned", fit.parameters))
+    }
+    return {
+        "vpl_count": fit.parameters.vpl_count,
+        "rotations": ROTATIONS,
+        "held_out_rotations": HELD_OUT_ROTATIONS,
+        "held_out_relmse": errors,
+        "trials": [asdict(trial) for trial in fit.trials],
+    }
+
+
+def _trials(
+    fits: dict[tuple[float, float], tuple[ArtistParameters, Descent]],
+) -> tuple[DensityTrial, ...]:
+    return tuple(DensityTrial(*densities, descent.loss) for densities, (_, descent) in fits.items())
+
+
+def _quadratic(points: Float[np.ndarray, "points 2"]) -> Float[np.ndarray, "points 6"]:
+    x, y = points.T
+    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+
+
+def _relmse(view: CapturedView) -> float:
+    """mean((y − a)(y − b) / (r² + 0.01·mean(r)²)): relMSE without the noise of the reference's halves."""
+    y = view.captured.indirect_irradiance[view.valid].astype(np.float64)
+    a, b = (half[view.valid] for half in (view.reference.irradiance_a, view.reference.irradiance_b))
+    r = (a.astype(np.float64) + b) / 2.0
+    denominator = r**2 + DARK_SHARE * r.mean() ** 2 if r.size else r
+    if not denominator.any():
+        return 0.0 if not y.any() else float("inf")
+    return float(np.mean((y - a) * (y - b) / denominator))

@@ -1,0 +1,244 @@
+"""The best picture within a frame's time: from the cost model, then settled and verified in the runtime."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from renderer.artist_parameters import ArtistParameters, parameter_spec
+from renderer.errors import InputError
+from renderer.runtime import Runtime
+from renderer.tuned_config import TunedConfig
+from tuner.cost_model import (
+    INTERLEAVES,
+    MAP_SIZES,
+    CostModel,
+    FrameChoice,
+    default_choice,
+    measured_cost_model,
+    rsm_resolutions,
+)
+from tuner.fit_density import (
+    HELD_OUT_ROTATIONS,
+    DensityFit,
+    fit_density,
+    rotated_views,
+    rotation_errors,
+    table_rotations,
+)
+from tuner.fit_falloff import fit_falloff
+from tuner.fit_status import Descent
+from tuner.prepare_scene import PreparedScene
+
+AIM = 0.97
+"""Of the budget: what a frame is settled at, so that noise does not carry it over."""
+LEAST, MOST = 0.93, 1.0
+"""Of the budget, between which a settled frame is left as it is."""
+OVER = 1.05
+"""Of the budget, above which no frame may stay."""
+TRIES = 8
+FRAMES = 7
+"""Timed each time; the median counts."""
+SHADOW_SHARE = 0.5
+"""Of the budget, which RSM and placement may take at most before the RSM is made coarser."""
+LEAST_COUNT = 4
+"""VPLs, below which a budget is called too small."""
+CHOICE_ROTATIONS = 3
+GUESSED_IMPORTANCE = 0.75
+"""η while the count is not yet known: what it costs does not depend on its value."""
+PARETO_POINTS = 6
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class SettledFrame:
+    """A VPL count whose measured frame fits the budget."""
+
+    choice: FrameChoice
+    vpl_count: int
+    milliseconds: float
+    tries: int
+
+
+@dataclass(frozen=True, eq=False)
+class BudgetFit:
+    """What was chosen for a budget, and how it measured."""
+
+    budget: float
+    frame: SettledFrame
+    predicted: float
+    parameters: ArtistParameters
+    descent: Descent
+    relmse: float
+    """In the runtime with all choices, over fitted views and held-out rotations."""
+    runtime: Runtime
+
+    def document(self) -> dict[str, Any]:
+        """What metrics.json says of it."""
+        return {
+            "budget_milliseconds": self.budget,
+            "milliseconds": self.frame.milliseconds,
+            "predicted_milliseconds": self.predicted,
+            "relmse": self.relmse,
+            "vpl_count": self.frame.vpl_count,
+            "choice": asdict(self.frame.choice),
+            "tries": self.frame.tries,
+        }
+
+
+class FrameBudget:
+    """Fits a prepared scene to budgets, of frames of one size.
+
+    The slowest of the fitted views counts. Raises MachineError as `Runtime`.
+    """
+
+    def __init__(
+        self,
+        prepared: PreparedScene,
+        start: TunedConfig,
+        frame_size: tuple[int, int],
+        *,
+        seed: int = 0,
+        progress: Progress | None = None,
+    ):
+        self._prepared = prepared
+        self._seed = seed
+        self._views = tuple(view for view in prepared.views if view.view.split == "fitted")
+        self._timed = tuple(replace(view.view, size=frame_size) for view in self._views)
+        guessed = replace(start.parameters, density_importance=GUESSED_IMPORTANCE)
+        self._start = replace(start, parameters=guessed)
+        self.costs: CostModel = measured_cost_model(prepared.scene, self._timed, self._start, progress)
+        self._runtimes: dict[FrameChoice, Runtime] = {}
+
+    def least_milliseconds(self) -> float:
+        """Of the cheapest frame that has any VPLs to speak of."""
+        return min(self.costs.milliseconds(choice, LEAST_COUNT) for choice in self._choices(0.0))
+
+    def fit(self, budget: float, progress: Progress | None = None) -> BudgetFit:
+        """The best found within `budget` milliseconds.
+
+        Raises:
+            InputError: no frame is as fast as that, or none was when it was measured.
+        """
+        frame = self._settle(self._best_choice(budget), budget)
+        start = replace(self._start.parameters, vpl_count=frame.vpl_count)
+        fit = self._fitted(start, progress)
+        config = replace(self._start, parameters=fit.parameters)
+        # Without importance a frame is cheaper, and the falloff does not change what it costs.
+        settled = self._settle(frame.choice, budget, config.parameters)
+        parameters = replace(fit.parameters, vpl_count=settled.vpl_count)
+        if abs(settled.vpl_count - frame.vpl_count) > 0.1 * frame.vpl_count:
+            parameters = self._falloff_at(parameters)
+        runtime = self._runtime(settled.choice)
+        rotations = table_rotations(HELD_OUT_ROTATIONS, self._seed, held_out=True)
+        errors = rotation_errors(runtime, self._views, parameters, rotations)
+        predicted = self.costs.milliseconds(settled.choice, settled.vpl_count)
+        return BudgetFit(budget, settled, predicted, parameters, fit.descent, float(errors.mean()), runtime)
+
+    def front(self, progress: Progress | None = None) -> tuple[BudgetFit, ...]:
+        """Fits over the range of useful budgets; a point that another beats in time and error is left out."""
+        least = 1.1 * self.least_milliseconds()
+        most = max(4.0 * least, self.costs.milliseconds(default_choice(self._timed[0]), 1024))
+        points: list[BudgetFit] = []
+        for index, budget in enumerate(np.geomspace(least, most, PARETO_POINTS)):
+            try:
+                points.append(self.fit(float(budget)))
+            except InputError:
+                continue  # the cheapest frame did not measure as predicted: the front starts later
+            if progress is not None:
+                progress((index + 1) / PARETO_POINTS)
+        return pareto_front(points)
+
+    def _choices(self, budget: float) -> list[FrameChoice]:
+        """All ways to gather, with the finest RSM that leaves enough of the budget."""
+        maps = MAP_SIZES if self._start.visibility == "maps" else (FrameChoice.visibility_map_size,)
+        resolutions = rsm_resolutions(self._timed[0])
+        resolution = next(
+            (each for each in resolutions if self._rsm_milliseconds(each) <= SHADOW_SHARE * budget),
+            resolutions[-1],
+        )
+        return [FrameChoice(interleave, size, resolution) for interleave in INTERLEAVES for size in maps]
+
+    def _rsm_milliseconds(self, resolution: int) -> float:
+        names = ("reflective_shadow_map", "vpl_importance", "virtual_point_lights")
+        costs = self.costs.rsm_resolution[resolution]
+        return sum(costs[name].fixed for name in names if name in costs)
+
+    def _best_choice(self, budget: float) -> FrameChoice:
+        """Least error of the start's own parameters, each choice with the VPLs that it can pay for."""
+        rotations = table_rotations(CHOICE_ROTATIONS, self._seed)
+        errors = {}
+        for choice in self._choices(budget):
+            count = min(self.costs.count_within(choice, AIM * budget), parameter_spec("vpl_count").high)
+            if count < LEAST_COUNT * choice.interleave**2:
+                continue  # every pixel of a block needs VPLs of its own
+            parameters = replace(self._start.parameters, vpl_count=int(count))
+            errors[choice] = rotation_errors(self._runtime(choice), self._views, parameters, rotations).mean()
+        if not errors:
+            raise InputError(
+                f"--budget-ms: must be at least {self.least_milliseconds():.3g} on this machine for "
+                f"frames of {self._timed[0].size[0]}x{self._timed[0].size[1]}, got {budget:g}"
+            )
+        return min(errors, key=lambda choice: errors[choice])
+
+    def _settle(
+        self, choice: FrameChoice, budget: float, parameters: ArtistParameters | None = None
+    ) -> SettledFrame:
+        """Change the count until the measured frame fits: the slope is the model's, its level measured."""
+        runtime = self._runtime(choice)
+        chosen = self._start.parameters if parameters is None else parameters
+        spec = parameter_spec("vpl_count")
+        expected = self.costs.count_within(choice, AIM * budget)
+        wanted = expected if parameters is None else parameters.vpl_count
+        slope, measured = self.costs.per_vpl(choice), {}
+        for attempt in range(TRIES):
+            count = int(np.clip(round(wanted), spec.low, spec.high))
+            runtime.parameters = replace(chosen, vpl_count=count)
+            taken = max(runtime.frame_milliseconds(view, FRAMES) for view in self._timed)
+            # A count that is asked for again has been timed on a quieter or busier machine: both count.
+            measured[count] = taken if count not in measured else 0.5 * (taken + measured[count])
+            if LEAST * budget <= measured[count] <= MOST * budget:
+                return SettledFrame(choice, count, measured[count], attempt + 1)
+            slope = _slope(measured, slope)
+            wanted = max(count + (AIM * budget - measured[count]) / slope, 0.25 * count)
+        fitting = {count: taken for count, taken in measured.items() if taken <= OVER * budget}
+        if not fitting:
+            raise InputError(
+                f"--budget-ms: no frame could be measured within {budget:g} ms; "
+                f"the fastest took {min(measured.values()):.3g}"
+            )
+        best = max(fitting, key=lambda count: fitting[count])
+        return SettledFrame(choice, best, fitting[best], TRIES)
+
+    def _fitted(self, start: ArtistParameters, progress: Progress | None) -> DensityFit:
+        runtime = self._prepared.runtime
+        return fit_density(runtime, self._views, start, seed=self._seed, progress=progress)
+
+    def _falloff_at(self, parameters: ArtistParameters) -> ArtistParameters:
+        rotations = table_rotations(HELD_OUT_ROTATIONS, self._seed)
+        captured = rotated_views(self._prepared.runtime, self._views, parameters, rotations)
+        return fit_falloff(captured, parameters, seed=self._seed)[0]
+
+    def _runtime(self, choice: FrameChoice) -> Runtime:
+        if choice not in self._runtimes:
+            self._runtimes[choice] = choice.runtime(self._prepared.scene, self._start)
+        return self._runtimes[choice]
+
+
+def pareto_front(points: Sequence[BudgetFit]) -> tuple[BudgetFit, ...]:
+    """Those that no other beats in both time and error, by rising time."""
+    front: list[BudgetFit] = []
+    for point in sorted(points, key=lambda point: (point.frame.milliseconds, point.relmse)):
+        if not front or point.relmse < front[-1].relmse:
+            front.append(point)
+    return tuple(front)
+
+
+def _slope(measured: dict[int, float], model: float) -> float:
+    """Milliseconds for each VPL: between the extreme counts that were measured, held near the model's."""
+    low, high = min(measured), max(measured)
+    if high < 1.2 * low:
+        return model
+    return float(np.clip((measured[high] - measured[low]) / (high - low), 0.3 * model, 3.0 * model))

@@ -162,6 +162,11 @@ class Runtime:
                 timing.end_frame()
         return timing.milliseconds()
 
+    @property
+    def context(self) -> moderngl.Context:
+        """The OpenGL context, for other runtimes to share."""
+        return self._context
+
     @_on_own_context
     def frame_milliseconds(self, view: View, frames: int = 5, lights: DynamicLights | None = None) -> float:
         """Milliseconds of a whole frame, the median of `frames` frames after one that is not timed."""

@@ -11,6 +11,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+import moderngl
+
 from renderer.atomic_file import write_text_whole
 from renderer.errors import InputError
 from renderer.light_faces import face_count
@@ -44,10 +46,10 @@ class FrameChoice:
     rsm_resolution: int = RSM_RESOLUTION
     """Of a face: shadows of direct light come from the same map, and grow coarser with it."""
 
-    def runtime(self, scene: Scene, config: TunedConfig) -> Runtime:
+    def runtime(self, scene: Scene, config: TunedConfig, context: moderngl.Context) -> Runtime:
         """A runtime that draws so."""
         options = RuntimeOptions(interleave=self.interleave, visibility_map_size=self.visibility_map_size)
-        return Runtime(scene, config, options, rsm_resolution=self.rsm_resolution)
+        return Runtime(scene, config, options, rsm_resolution=self.rsm_resolution, context=context)
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ class CostModel:
             combined[name] = cost
         return combined
 
-    def milliseconds(self, choice: FrameChoice, count: float) -> float:
+    def milliseconds(self, choice: FrameChoice, count: int) -> float:
         """Of a whole frame with `count` VPLs."""
         return sum(cost.fixed + cost.per_vpl * count for cost in self.costs(choice).values())
 
@@ -107,14 +109,14 @@ def measured_cost_model(
     scene: Scene,
     views: Sequence[View],
     config: TunedConfig,
+    context: moderngl.Context,
     progress: Callable[[float], None] | None = None,
 ) -> CostModel:
     """The cost of a frame that shows the slowest of `views`, from the cache or measured now.
 
     `config` says how VPLs are occluded, and whether there is importance and a near field to pay for.
     """
-    runtime = default_choice(views[0]).runtime(scene, config)
-    path = _path(runtime, scene, views, config)
+    path = _path(str(context.info["GL_RENDERER"]), scene, views, config)
     kept = _read(path)
     if kept is not None:
         return kept
@@ -132,7 +134,7 @@ def measured_cost_model(
         for value in axis:
             choice = replace(base, **{name: value})
             if choice not in measured:
-                measured[choice] = _measure(choice.runtime(scene, config), views, config)
+                measured[choice] = _measure(choice.runtime(scene, config, context), views, config)
             axes[name][value] = measured[choice]
             done += 1
             if progress is not None:
@@ -174,8 +176,8 @@ def _measure(runtime: Runtime, views: Sequence[View], config: TunedConfig) -> Co
     return costs
 
 
-def _path(runtime: Runtime, scene: Scene, views: Sequence[View], config: TunedConfig) -> Path:
-    parts = [_FORMAT, runtime.opengl_renderer, scene_digest(scene), config.visibility]
+def _path(renderer: str, scene: Scene, views: Sequence[View], config: TunedConfig) -> Path:
+    parts = [_FORMAT, renderer, scene_digest(scene), config.visibility]
     parts += [config.parameters.density_importance > 0.0, config.parameters.screen_space_strength > 0.0]
     for view in views:
         parts += [view.size, view.camera.to_world.tolist(), view.camera.yfov]

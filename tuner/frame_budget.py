@@ -109,7 +109,9 @@ class FrameBudget:
         self._timed = tuple(replace(view.view, size=frame_size) for view in self._views)
         guessed = replace(start.parameters, density_importance=GUESSED_IMPORTANCE)
         self._start = replace(start, parameters=guessed)
-        self.costs: CostModel = measured_cost_model(prepared.scene, self._timed, self._start, progress)
+        self.costs: CostModel = measured_cost_model(
+            prepared.scene, self._timed, self._start, prepared.runtime.context, progress
+        )
         self._runtimes: dict[FrameChoice, Runtime] = {}
 
     def least_milliseconds(self) -> float:
@@ -223,7 +225,9 @@ class FrameBudget:
 
     def _runtime(self, choice: FrameChoice) -> Runtime:
         if choice not in self._runtimes:
-            self._runtimes[choice] = choice.runtime(self._prepared.scene, self._start)
+            self._runtimes[choice] = choice.runtime(
+                self._prepared.scene, self._start, self._prepared.runtime.context
+            )
         return self._runtimes[choice]
 
 

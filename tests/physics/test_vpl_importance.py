@@ -3,18 +3,13 @@
 import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
+from converged_views import corner_view
 
 from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
 from renderer.scene import Camera, look_at, scaled
 from renderer.tuned_config import TunedConfig
 from renderer.views import View, scaled_view
-
-
-def corner_view(light: str, size=(32, 24)) -> View:
-    """From inside, close to a corner away from most of what is lit."""
-    camera = Camera(look_at(np.array([0.1, -0.3, 0.4]), np.array([1.0, -0.9, -1.0])), 0.9)
-    return View(light, "fitted", size, camera, (ROOM_LIGHTS[light],))
 
 
 def runtime_with(gl_context, scene=None, resolution=256, **parameters) -> Runtime:

@@ -1,0 +1,103 @@
+"""Density and falloff fitted to the error of few VPLs, on rotations of the point table."""
+
+import numpy as np
+import pytest
+from built_scenes import colored_room
+from converged_views import MANY, converged_view
+
+from renderer.artist_parameters import ArtistParameters
+from renderer.runtime import Runtime
+from tuner.captured_view import CapturedView
+from tuner.fit_density import (
+    DensityTrial,
+    fit_density,
+    response_minimum,
+    rotation_errors,
+    table_rotations,
+)
+from tuner.fit_status import FitStatus
+
+FEW = ArtistParameters(vpl_count=24)
+
+
+@pytest.fixture(scope="module")
+def room(gl_context) -> tuple[Runtime, CapturedView]:
+    runtime = Runtime(colored_room(), "default", rsm_resolution=128, context=gl_context)
+    return runtime, converged_view(runtime, "spot")
+
+
+def test_few_vpls_are_better_where_they_were_not_fitted_to(room):
+    """On held-out rotations, 24 fitted VPLs beat 24 of the default by a third, and 48 uniform ones."""
+    runtime, view = room
+    fit = fit_density(runtime, (view,), FEW, rotations=table_rotations(4, 0))
+    rotations = table_rotations(16, 0, held_out=True)
+
+    def error(parameters: ArtistParameters) -> float:
+        return float(rotation_errors(runtime, (view,), parameters, rotations).mean())
+
+    tuned = error(fit.parameters)
+    assert tuned < 0.67 * error(FEW)
+    assert tuned < error(ArtistParameters(vpl_count=48, density_exponent=0.0))
+    assert fit.parameters.vpl_count == FEW.vpl_count
+    assert fit.descent.loss == min(trial.loss for trial in fit.trials)
+
+
+def test_the_result_is_never_worse_than_the_falloff_alone(room):
+    """The start's own density is among the trials, whatever it is."""
+    runtime, view = room
+    start = ArtistParameters(vpl_count=16, density_exponent=0.8, density_importance=0.3)
+    fit = fit_density(runtime, (view,), start, rotations=table_rotations(2, 0))
+    own = [t for t in fit.trials if (t.density_exponent, t.density_importance) == (0.8, 0.3)]
+    assert len(own) == 1
+    assert fit.descent.loss <= own[0].loss
+
+
+def test_nothing_lit_is_a_status(gl_context):
+    runtime = Runtime(colored_room(), "default", rsm_resolution=64, context=gl_context)
+    view = converged_view(runtime, "spot")
+    away = Runtime(colored_room(), "default", rsm_resolution=64, context=gl_context)
+    dark = CapturedView(
+        type(view.view)("dark", "fitted", view.view.size, view.view.camera, ()), view.reference, view.captured
+    )
+    fit = fit_density(away, (dark,), FEW, rotations=((0.0, 0.0),))
+    assert fit.descent.status is FitStatus.NOTHING_LIT
+    assert fit.parameters == FEW
+    assert len(fit.trials) == 1
+
+
+def test_the_response_surface_finds_the_bottom_of_a_bowl():
+    """Of the exponential of a quadratic form, noise of 2 % moves its minimum by less than 0.15."""
+    random = np.random.default_rng(0)
+    for _ in range(20):
+        target = random.random(2)
+        trials = []
+        for exponent in (0.0, 0.5, 1.0):
+            for importance in (0.0, 0.5, 1.0):
+                bowl = (exponent - target[0]) ** 2 + 2.0 * (importance - target[1]) ** 2
+                loss = float(np.exp(bowl) * (1.0 + 0.02 * random.standard_normal()))
+                trials.append(DensityTrial(exponent, importance, loss))
+        assert np.abs(np.array(response_minimum(trials)) - target).max() < 0.15
+
+
+def test_losses_below_zero_do_not_break_the_surface():
+    """Free of the reference's noise, a perfect fit may end a little below 0."""
+    trials = [DensityTrial(x, y, x**2 + y**2 - 0.001) for x in (0.0, 0.5, 1.0) for y in (0.0, 0.5, 1.0)]
+    assert response_minimum(trials) == (0.0, 0.0)
+
+
+def test_rotations_are_common_and_held_out_ones_are_others():
+    """The same seed gives the same ones; the first is what the runtime draws with."""
+    fitted, held_out = table_rotations(8, 3), table_rotations(8, 3, held_out=True)
+    assert fitted == table_rotations(8, 3)
+    assert fitted[0] == (0.0, 0.0)
+    assert not set(fitted) & set(held_out)
+    assert table_rotations(8, 4)[1:] != fitted[1:]
+
+
+def test_error_is_of_the_rotated_picture(room):
+    """Each rotation has an error of its own, and many VPLs have none against their own picture."""
+    runtime, view = room
+    errors = rotation_errors(runtime, (view,), FEW, table_rotations(3, 0))
+    assert errors.shape == (1, 3)
+    assert len(set(errors.ravel())) == 3
+    assert rotation_errors(runtime, (view,), MANY, ((0.0, 0.0),)).item() == pytest.approx(0.0, abs=1e-9)

@@ -21,11 +21,29 @@ PLANTED = {
         "finite_n": 0.03,
         "missing_bounces": 0.0,
         "filter": 0.005,
+        "remainder": -0.02,
+    },
+    "budget": {
+        "frame_size": [640, 480],
+        "budget_milliseconds": 4.0,
+        "milliseconds": 3.75,
+        "predicted_milliseconds": 3.5,
+        "relmse": 0.15,
+        "vpl_count": 200,
+        "choice": {"interleave": 4, "visibility": "maps"},
+        "tries": 2,
     },
     "pareto": [
-        {"milliseconds": 1.0, "relmse": 0.5, "parameters": {"vpl_count": 16}, "config": "pareto/1.json"},
-        {"milliseconds": 2.0, "relmse": 0.2, "parameters": {"vpl_count": 64}, "config": "pareto/2.json"},
-        {"milliseconds": 8.0, "relmse": 0.1, "parameters": {"vpl_count": 512}, "config": "pareto/3.json"},
+        {"milliseconds": 1.0, "relmse": 0.5, "parameters": {"vpl_count": 16}, "config": "pareto/0.json"},
+        {"milliseconds": 2.0, "relmse": 0.2, "parameters": {"vpl_count": 64}, "config": "pareto/1.json"},
+        {
+            "milliseconds": 8.0,
+            "relmse": 0.1,
+            "vpl_count": 512,
+            "choice": {"interleave": 4},
+            "parameters": {"vpl_count": 512},
+            "config": "pareto/2.json",
+        },
     ],
 }
 

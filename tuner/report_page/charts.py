@@ -47,10 +47,20 @@ class LineChart:
 
 @dataclass(frozen=True)
 class Bar:
+    """A bar from 0 to a value; places are shares of the chart's width, in [0, 1]."""
+
     label: str
-    share: float
-    """Of the chart's width, in [0, 1]."""
+    left: float
+    width: float
+    negative: bool
     text: str
+
+
+@dataclass(frozen=True)
+class BarChart:
+    zero: float
+    """Where 0 stands: at the left end, unless a value is negative."""
+    bars: list[Bar]
 
 
 def loss_chart(loss: Mapping[str, Any]) -> LineChart | None:
@@ -135,11 +145,16 @@ def pareto_chart(front: Sequence[Mapping[str, Any]], ceiling: Any, budget: Any) 
     )
 
 
-def bars(values: Mapping[str, Any], word: Callable[[Any], str] = number) -> list[Bar]:
-    """Bars of the numbers among `values`, in their order, the greatest as wide as the chart."""
+def bar_chart(values: Mapping[str, Any], word: Callable[[Any], str] = number) -> BarChart | None:
+    """Bars of the numbers among `values`, in their order; None where there is none."""
     known = {name: value for name, raw in values.items() if (value := finite(raw)) is not None}
-    greatest = max((abs(value) for value in known.values()), default=0.0)
-    return [
-        Bar(words(name), max(value, 0.0) / greatest if greatest else 0.0, word(value))
-        for name, value in known.items()
-    ]
+    if not known:
+        return None
+    low, high = min(0.0, *known.values()), max(0.0, *known.values())
+    axis = Axis(low, high if high > low else low + 1.0, 0.0, 1.0)
+    zero = axis.share(0.0)
+    bars = []
+    for name, value in known.items():
+        place = axis.share(value)
+        bars.append(Bar(words(name), min(place, zero), abs(place - zero), value < 0.0, word(value)))
+    return BarChart(zero, bars)

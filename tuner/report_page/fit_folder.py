@@ -17,6 +17,7 @@ _KINDS = {
     "provenance": dict,
     "uncertainty": dict,
     "error_budget": dict,
+    "budget": dict,
     "per_view": list,
     "notes": list,
     "pareto": list,

@@ -24,10 +24,13 @@ class Axis:
 
     def place(self, value: float | int) -> float:
         """Where `value` stands; what lies outside stands at the end it is beyond."""
-        low, high, value = (
-            self._unit(v) for v in (self.low, self.high, min(max(value, self.low), self.high))
-        )
-        return round(self.start + (self.stop - self.start) * (value - low) / (high - low), 2)
+        return round(self.start + (self.stop - self.start) * self.share(value), 2)
+
+    def share(self, value: float | int) -> float:
+        """How far along the axis `value` stands, in [0, 1]."""
+        inside = min(max(value, self.low), self.high)
+        low, high, at = (self._unit(end) for end in (self.low, self.high, inside))
+        return (at - low) / (high - low)
 
     def ticks(self, about: int = 5) -> list[float]:
         """Round values within the axis, roughly `about` of them."""

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Any
 
-from tuner.report_page.charts import Bar, bars, loss_chart, pareto_chart
+from tuner.report_page.charts import BarChart, bar_chart, loss_chart, pareto_chart
 from tuner.report_page.error_maps import DIVERGING, MAGMA
 from tuner.report_page.fit_folder import FitFolder, split_figures
 from tuner.report_page.page_template import MAXIMUM_PAGE_BYTES, page_html
@@ -33,7 +33,7 @@ def scene_page(fit: FitFolder, name: str | None = None, library: str | None = No
     """
     document = fit.document
     views, left_out = _views(fit)
-    budget, budget_note = _error_budget(fit.part("error_budget"))
+    budget, budget_views = _error_budget(fit.part("error_budget"))
     front = fit.part("pareto")
     return page_html(
         "scene.html.j2",
@@ -58,11 +58,14 @@ def scene_page(fit: FitFolder, name: str | None = None, library: str | None = No
         has_uncertainty=bool(fit.part("uncertainty")),
         loss_chart=loss_chart(fit.part("loss")),
         pareto_chart=pareto_chart(
-            front, split_figures(document, "fitted", "ceiling").get("relmse"), document.get("budget")
+            front,
+            split_figures(document, "fitted", "ceiling").get("relmse"),
+            fit.part("budget").get("budget_milliseconds"),
         ),
+        frame_budget=_frame_budget(fit.part("budget")),
         pareto_rows=[_front_row(point) for point in front],
         error_budget=budget,
-        budget_note=budget_note,
+        budget_views=budget_views,
         timings=_timings(fit.part("seconds")),
         notes=[str(note) for note in fit.part("notes")],
         origin=_origin(fit),
@@ -134,31 +137,63 @@ def _figure_rows(figures: Mapping[str, Any]) -> list[dict[str, str]]:
     return [*rows, {"variant": "noise floor", "relmse": floor, "energy": "", "flip": ""}]
 
 
-def _error_budget(budget: Mapping[str, Any]) -> tuple[list[Bar], str]:
-    """Bars of the causes, and which views they were measured on."""
-    causes = {name: value for name, value in budget.items() if name != "views"}
-    views = budget.get("views")
-    if isinstance(views, list):
-        views = ", ".join(str(view) for view in views)
-    return bars(causes), f"measured on {views}" if views else ""
+def _error_budget(budget: Mapping[str, Any]) -> tuple[BarChart | None, str]:
+    """Bars of the causes, the greatest first, and the views that they were measured on."""
+    causes = {name: value for name, raw in budget.items() if (value := finite(raw)) is not None}
+    views = str(budget.get("views", "")).replace("_", " ")
+    return bar_chart(dict(sorted(causes.items(), key=lambda cause: -cause[1]))), views
 
 
-def _timings(stages: Mapping[str, Any]) -> list[Bar]:
+def _timings(stages: Mapping[str, Any]) -> BarChart | None:
     known = {
         name: value for name, value in stages.items() if name != "total" and (finite(value) or 0.0) > 0.0
     }
-    return bars(known, seconds)
+    return bar_chart(known, seconds)
 
 
 def _front_row(point: Mapping[str, Any]) -> dict[str, str]:
     parameters = point.get("parameters")
-    named = parameters.items() if isinstance(parameters, dict) else ()
+    parameters = parameters if isinstance(parameters, dict) else {}
     return {
         "milliseconds": number(point.get("milliseconds")),
         "relmse": number(point.get("relmse")),
-        "parameters": ", ".join(f"{words(name)} {number(value)}" for name, value in named),
+        "vpls": number(point.get("vpl_count", parameters.get("vpl_count")), 5),
+        "choice": _choice(point),
         "config": str(point.get("config", "")),
     }
+
+
+def _choice(point: Mapping[str, Any]) -> str:
+    """What was chosen beside the parameters, in words."""
+    choice = point.get("choice")
+    named = choice.items() if isinstance(choice, dict) else ()
+    return ", ".join(
+        f"{words(name)} {number(value) if finite(value) is not None else value}" for name, value in named
+    )
+
+
+def _frame_budget(budget: Mapping[str, Any]) -> list[dict[str, str]]:
+    """Cards on the frame that was asked for and the one that was measured; none where none was."""
+    if not budget:
+        return []
+    size = budget.get("frame_size")
+    pixels = "×".join(number(side, 5) for side in size) if isinstance(size, list) else ""
+    asked, measured = budget.get("budget_milliseconds"), budget.get("milliseconds")
+    predicted = f"predicted {number(budget.get('predicted_milliseconds'))} ms"
+    return [
+        {
+            "what": "Asked for",
+            "after": f"{number(asked)} ms",
+            "note": f"a frame of {pixels}" if pixels else "",
+        },
+        {"what": "Measured", "after": f"{number(measured)} ms", "note": predicted},
+        {"what": "VPLs", "after": number(budget.get("vpl_count"), 5), "note": _choice(budget)},
+        {
+            "what": "relMSE",
+            "after": number(budget.get("relmse")),
+            "note": "over rotations of the point table that were not fitted",
+        },
+    ]
 
 
 def _origin(fit: FitFolder) -> list[tuple[str, str]]:

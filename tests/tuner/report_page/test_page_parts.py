@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
-from tuner.report_page.charts import bars, loss_chart, pareto_chart
+from tuner.report_page.charts import bar_chart, loss_chart, pareto_chart
 from tuner.report_page.error_maps import DIVERGING, MAGMA, map_png, signed_error
 from tuner.report_page.page_text import NONE, change, number, seconds
 from tuner.report_page.parameter_rows import BAR_WIDTH, parameter_rows
@@ -199,10 +199,25 @@ def test_a_front_is_drawn_from_fast_to_slow_with_ceiling_and_budget():
 
 
 def test_bars_are_as_wide_as_their_share_of_the_greatest():
-    drawn = bars({"a_b": 2.0, "none": None, "c": 1.0, "less than nothing": -1.0})
-    assert [(bar.label, bar.share) for bar in drawn] == [("a b", 1.0), ("c", 0.5), ("less than nothing", 0.0)]
-    assert bars({}) == []
-    assert bars({"zero": 0.0})[0].share == 0.0
+    chart = bar_chart({"finite_n": 2.0, "none": None, "c": 1.0})
+    assert chart.zero == 0.0
+    assert [(bar.label, bar.left, bar.width) for bar in chart.bars] == [
+        ("finite N", 0.0, 1.0),
+        ("c", 0.0, 0.5),
+    ]
+    assert bar_chart({}) is None
+    assert bar_chart({"zero": 0.0}).bars[0].width == 0.0
+
+
+def test_a_negative_share_goes_the_other_way():
+    chart = bar_chart({"up": 3.0, "down": -1.0})
+    assert chart.zero == 0.25
+    assert [(bar.left, bar.width, bar.negative) for bar in chart.bars] == [
+        (0.25, 0.75, False),
+        (0.0, 0.25, True),
+    ]
+    down = bar_chart({"down": -2.0})
+    assert (down.zero, down.bars[0].left, down.bars[0].width) == (1.0, 0.0, 1.0)
 
 
 def test_every_parameter_has_a_row_with_its_place_in_its_range():

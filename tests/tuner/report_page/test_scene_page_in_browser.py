@@ -260,6 +260,9 @@ def test_parts_appear_where_the_fit_made_them(chromium, fit_copy):
         ):
             assert words in text
         assert "the prior" in text
+        for words in ("3.75 ms", "predicted 3.5 ms", "640×480", "interleave 4, visibility maps"):
+            assert words in text
+        assert shown.page.locator(".chart .named", has_text="asked for 4 ms").count() == 1
         assert "intensity, falloff transmittance" in text
         assert shown.page.locator(".range .interval").count() == 2
         described = shown.page.locator(".chart desc").all_text_contents()
@@ -283,7 +286,8 @@ def test_names_from_scenes_are_text_and_nothing_else(chromium, fit_copy):
         seconds={**document["seconds"], HOSTILE: 2.0},
         error_budget={"views": HOSTILE, HOSTILE: 1.0},
         uncertainty={"intensity": {"low": 0.5, "high": 2.0, "determined": True, "trades_with": [HOSTILE]}},
-        pareto=[{"milliseconds": 1.0, "relmse": 1.0, "parameters": {HOSTILE: 1}, "config": HOSTILE}],
+        pareto=[{"milliseconds": 1.0, "relmse": 1.0, "choice": {HOSTILE: HOSTILE}, "config": HOSTILE}],
+        budget={"choice": {HOSTILE: HOSTILE}, "frame_size": [HOSTILE, 1]},
         per_view=[{**view, "name": HOSTILE, "split": HOSTILE} for view in document["per_view"]],
     )
     assert run(["report", str(fit_copy)]) == 0

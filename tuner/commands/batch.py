@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from tuner.library.supervised_process import Limits
 
 RUN_PANEL = "How it is run"
+SCENE_MEMORY_BYTES = 2 * 2**30
+"""That a worker should have: twice what a process that fits takes."""
 SLURM_TASKS = 64
 """Of an array, where `--workers` is not given."""
 MEMORY_UNITS = {"M": 2**20, "G": 2**30}
@@ -62,7 +64,7 @@ def batch(
         typer.Option(
             min=1,
             max=1024,
-            help="Scenes at a time. [cores ÷ threads]",
+            help="Scenes at a time. [as many as cores and memory allow]",
             show_default=False,
             rich_help_panel=RUN_PANEL,
         ),
@@ -134,8 +136,7 @@ def batch(
     if scheduler is not None and slurm is not None:
         raise InputError("--scheduler and --slurm: only one of them can be given")
     elsewhere = scheduler is not None or slurm is not None
-    cores = len(os.sched_getaffinity(0))
-    count = workers or (SLURM_TASKS if slurm is not None else max(1, cores // threads))
+    count = workers or (SLURM_TASKS if slurm is not None else _workers_that_fit(threads))
     limits = _limits(time_limit, memory_limit, retries, None if elsewhere else count)
     tasks = None if slurm is None else parse_slurm(slurm)
     with shown_batch(count) as watcher:
@@ -150,6 +151,14 @@ def batch(
             command=command_line(),
         )
     return _report(result, output)
+
+
+def _workers_that_fit(threads: int) -> int:
+    """How many scenes at a time this machine has cores and memory for."""
+    from tuner.library.supervised_process import machine_memory_bytes
+
+    cores = len(os.sched_getaffinity(0))
+    return max(1, min(cores // threads, machine_memory_bytes() // SCENE_MEMORY_BYTES))
 
 
 def _limits(time_limit: float, memory_limit: str | None, retries: int, sharing: int | None) -> "Limits":

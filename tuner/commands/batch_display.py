@@ -72,6 +72,7 @@ class BarDisplay:
 
     def found(self, jobs: "Sequence[Job]", already_done: int) -> None:
         self._forecast.found(jobs)
+        self._already_done = already_done
         self._whole = self._bars.add_task("scenes", total=len(jobs) + already_done, note="")
         self._bars.update(self._whole, completed=already_done)
 
@@ -87,7 +88,8 @@ class BarDisplay:
             if key in self._scenes:
                 self._bars.remove_task(self._scenes.pop(key))
             self._bars.advance(self._whole)
-        self._bars.update(self._whole, note=time_left(self._forecast).removeprefix("; "))
+        done, all_scenes = (self._already_done + n for n in (self._forecast.done, self._forecast.total))
+        self._bars.update(self._whole, note=f"{done} of {all_scenes}{time_left(self._forecast)}")
         line = ending(event)
         if line:
             self._bars.console.print(line, markup=False, highlight=False)

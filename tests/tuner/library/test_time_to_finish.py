@@ -1,9 +1,13 @@
 """The forecast: exact where scenes are alike, honest where they are not, silent where it knows nothing."""
 
+import io
+
 import numpy as np
 import pytest
+from rich.console import Console
+from rich.progress import Progress, TextColumn
 
-from tuner.commands.batch_display import ending, time_left
+from tuner.commands.batch_display import BarDisplay, ending, time_left
 from tuner.library.time_to_finish import Forecast, SceneSeconds, seconds_left
 
 
@@ -94,6 +98,30 @@ def test_lines_for_a_pipe():
     assert ending(record) == "refused a.glb (0.0 s): empty"
     assert ending(record | {"status": "done"}) == "done a.glb (0.0 s)"
     assert ending({"event": "scene_started", "name": "a.glb"}) == ""
+
+
+def test_bars_on_a_terminal(make_job):
+    """Scenes that ended scroll away above; one at work shows its stage; names are text and no markup."""
+    screen = io.StringIO()
+    forecast, jobs = forecast_of(make_job, [5] * 4, workers=1)
+    columns = (TextColumn("{task.description} {task.percentage:.0f} {task.fields[note]}", markup=False),)
+    with Progress(*columns, console=Console(file=screen, force_terminal=True, width=100)) as bars:
+        display = BarDisplay(forecast, bars)
+        display.found(jobs, already_done=4)
+        display.happened({"event": "scene_started", "key": jobs[0].key, "name": "[red]a.glb"})
+        display.happened(
+            {"event": "stage", "key": jobs[0].key, "name": "[red]a.glb", "stage": "capture", "share": 0.5}
+        )
+        bars.refresh()
+        shown = screen.getvalue()
+        record = {"event": "record", "key": jobs[0].key, "name": "[red]a.glb", "status": "done"}
+        display.happened({**record, "seconds": 2.0, "attempts": 1, "reason": ""})
+        bars.refresh()
+        assert len(bars.tasks) == 1
+    assert "[red]a.glb 50 capture" in shown
+    assert "scenes 50" in shown
+    assert "done [red]a.glb (2.0 s)" in screen.getvalue()
+    assert bars.tasks[0].percentage == 62.5
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from renderer.errors import InputError
 from renderer.runtime import Runtime
 from renderer.tuned_config import TunedConfig, read_config
 from tuner import cost_model, frame_budget
-from tuner.commands.budget_flags import budget_from_flags, with_vpl_count
+from tuner.commands.budget_flags import budget_from_flags, render_flags, with_vpl_count
 from tuner.cost_model import CostModel, FrameChoice, PassCost, measured_cost_model
 from tuner.fit_budget import BudgetOptions, fit_to_budget
 from tuner.frame_budget import FrameBudget
@@ -143,3 +143,10 @@ def test_flags():
             budget_from_flags(None, wrong, False, None)
     with pytest.raises(ValueError, match="milliseconds: must be given"):
         BudgetOptions(None)
+
+
+def test_the_next_command_draws_as_the_budget_did():
+    choice = {"interleave": 4, "visibility_map_size": 8, "rsm_resolution": 256}
+    flags = render_flags({"budget": {"choice": choice, "frame_size": [64, 48]}})
+    assert flags == ["--interleave=4", "--map-size=8", "--rsm-resolution=256", "--size=64x48"]
+    assert render_flags({}) == []

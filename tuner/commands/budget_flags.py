@@ -37,6 +37,19 @@ def budget_from_flags(
     return BudgetOptions(budget_ms, pareto, None if frame_size is None else parse_size(frame_size))
 
 
+def render_flags(document: Mapping[str, Any]) -> list[str]:
+    """What `vpltune render` needs to be told to draw as the budget's frames were."""
+    if "budget" not in document:
+        return []
+    choice = document["budget"]["choice"]
+    return [
+        f"--interleave={choice['interleave']}",
+        f"--map-size={choice['visibility_map_size']}",
+        f"--rsm-resolution={choice['rsm_resolution']}",
+        "--size={}x{}".format(*document["budget"]["frame_size"]),
+    ]
+
+
 def budget_lines(document: Mapping[str, Any]) -> tuple[Any, ...]:
     """What `vpltune fit` shows of density, budget and front."""
     lines: list[Any] = []

@@ -124,11 +124,12 @@ def fit(
 def _report(document: dict, output: Path) -> Report:
     from rich.markup import escape
 
-    from tuner.commands.budget_flags import budget_lines
+    from tuner.commands.budget_flags import budget_lines, render_flags
     from tuner.commands.metrics_table import error_budget_table, metrics_table, parameters_table
 
     config, picture = output / "tuned.json", output / "tuned.png"
     command = ["vpltune", "render", document["scene"], "--config", str(config), "-o", str(picture)]
+    command += render_flags(document)
     shown = (
         parameters_table(document["parameters"], document["uncertainty"]),
         metrics_table(document["metrics"]),

@@ -55,6 +55,19 @@ def render(
     interleave: Annotated[
         int, typer.Option(metavar="1|2|4|8", help="Blocks of NxN pixels share the VPLs out: faster above 1.")
     ] = 1,
+    map_size: Annotated[
+        int, typer.Option(metavar="TEXELS", min=4, max=64, help="Along the side of a VPL's visibility map.")
+    ] = 16,
+    rsm_resolution: Annotated[
+        int | None,
+        typer.Option(
+            metavar="TEXELS",
+            min=64,
+            max=8192,
+            help="Along the side of a light's map of shadows and VPLs. [1024; 512 for point lights]",
+            show_default=False,
+        ),
+    ] = None,
     dynamic_lights: Annotated[
         int,
         typer.Option(
@@ -134,7 +147,12 @@ def render(
     sequence = Sequence(loaded, drawn, motion, factor)
     if factor != 1.0:
         loaded, drawn = scaled(loaded, factor), scaled_view(drawn, factor)
-    runtime = Runtime(loaded, tuned, RuntimeOptions(interleave=interleave))
+    runtime = Runtime(
+        loaded,
+        tuned,
+        RuntimeOptions(interleave=interleave, visibility_map_size=map_size),
+        rsm_resolution=rsm_resolution,
+    )
     bouncing = _bouncing_lights(loaded, drawn, dynamic_lights)
     if frames is None:
         _write_layer(runtime, drawn, layer, output, bouncing)

@@ -1,0 +1,204 @@
+"""Error against the number of VPLs: drawn uniformly, by default, and fitted; on rotations not fitted to.
+
+With visibility maps, on fitted and held-out views. γ and η are fitted once for each scene, at `FITTED_COUNT`
+VPLs, the falloff at every count. Curves go to out/density/curves.json and out/density/curves.png.
+
+`python -m benchmarks.density SCENE …` does it for some of the scenes only.
+"""
+
+import json
+import statistics
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.row import Row
+from benchmarks.scene_library import REPOSITORY, present_scenes
+from renderer.artist_parameters import ArtistParameters
+from renderer.atomic_file import write_text_whole, written_whole
+from renderer.runtime import Runtime
+from renderer.tuned_config import TunedConfig
+from tuner.captured_view import CapturedView
+from tuner.fit_density import fit_density, rotated_views, rotation_errors, table_rotations
+from tuner.fit_falloff import fit_falloff
+from tuner.prepare_scene import SceneOptions, Stopwatch, prepare_scene
+
+SCENES = (
+    "cornell-box",
+    "courtyard",
+    "gallery",
+    "bevy-cornellbox",
+    "godot-living-room",
+    "kajiya-cornell-box",
+)
+SIZE = (64, 48)
+COUNTS = (8, 16, 32, 64, 128, 256, 512, 1024)
+FITTED_COUNT = 32
+DEFAULT_COUNT = 256
+ROTATIONS = 4
+"""To fit to, and as many others to measure on."""
+SLOPE_STEPS = 20
+"""Along η, at each of which the sign of the measured slope is compared with the smooth trend's."""
+_UNIFORM = ArtistParameters(density_exponent=0.0)
+
+Curve = dict[int, float]
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class SceneCurves:
+    """relMSE by VPL count, means over all views and held-out rotations."""
+
+    name: str
+    uniform: Curve
+    default: Curve
+    fitted: Curve
+    parameters: ArtistParameters
+    """Fitted at FITTED_COUNT."""
+
+
+def rows(progress: Progress) -> list[Row]:
+    """For each scene and in the median: VPLs for the same error, and few tuned ones against many."""
+    present = present_scenes()
+    names = [name for name in SCENES if name in present]
+    curves = [measured_curves(name, present[name], progress) for name in names]
+    write_curves(REPOSITORY / "out" / "density", curves)
+    return [*curve_rows(curves), slope_row(names[0], present[names[0]], progress)]
+
+
+def curve_rows(curves: Sequence[SceneCurves]) -> list[Row]:
+    """Of scenes that were measured."""
+    made = []
+    for scene in curves:
+        same = count_for_error(scene.uniform, scene.fitted[FITTED_COUNT])
+        made += [
+            Row(
+                f"vpls_for_same_error.{scene.name}", float(FITTED_COUNT), "VPLs", "uniform over texels", same
+            ),
+            Row(
+                f"tuned_32_over_default_256.{scene.name}",
+                scene.fitted[FITTED_COUNT],
+                "relMSE",
+                f"default at {DEFAULT_COUNT} VPLs",
+                scene.default[DEFAULT_COUNT],
+            ),
+            Row(
+                f"tuned_32_over_default_32.{scene.name}",
+                scene.fitted[FITTED_COUNT],
+                "relMSE",
+                "default at as many VPLs",
+                scene.default[FITTED_COUNT],
+            ),
+        ]
+    for name in ("vpls_for_same_error", "tuned_32_over_default_256", "tuned_32_over_default_32"):
+        ratios = [row.ratio for row in made if row.name.startswith(f"{name}.")]
+        made.append(Row(name, statistics.median(ratios), "1", "median over scenes; limit", 1.0))
+    return made
+
+
+def measured_curves(name: str, path: Path, progress: Progress) -> SceneCurves:
+    """All three curves of one scene."""
+    runtime, views = _prepared(path)
+    fitted_views = [view for view in views if view.view.split == "fitted"]
+    rotations = table_rotations(ROTATIONS, 0)
+    progress(f"{name}: density", 0.0)
+    start = ArtistParameters(vpl_count=FITTED_COUNT)
+    found = fit_density(runtime, fitted_views, start, rotations=rotations).parameters
+    curves: dict[str, Curve] = {"uniform": {}, "default": {}, "fitted": {}}
+    for index, count in enumerate(COUNTS):
+        progress(f"{name}: {count} VPLs", index / len(COUNTS))
+        drawn = replace(found, vpl_count=count)
+        tuned = fit_falloff(rotated_views(runtime, fitted_views, drawn, rotations), drawn)[0]
+        for variant, parameters in (
+            ("uniform", _UNIFORM),
+            ("default", ArtistParameters()),
+            ("fitted", tuned),
+        ):
+            curves[variant][count] = _error(runtime, views, replace(parameters, vpl_count=count))
+    return SceneCurves(name, **curves, parameters=found)
+
+
+def count_for_error(curve: Curve, error: float) -> float:
+    """How many VPLs the curve needs for that error; its last count where it does not get there."""
+    counts, errors = np.log(list(curve)), np.log(np.maximum(list(curve.values()), 1e-9))
+    # Counts that noise has made worse than fewer are passed over: the curve falls all the way.
+    first = errors < np.minimum.accumulate(np.concatenate([[np.inf], errors[:-1]]))
+    return float(np.exp(np.interp(-np.log(max(error, 1e-9)), -errors[first], counts[first])))
+
+
+def slope_row(name: str, path: Path, progress: Progress) -> Row:
+    """How often a step along η tells the way that the smooth trend of the same losses goes.
+
+    A gradient is of use where it does nearly always; a coin would do so half of the time.
+    """
+    runtime, views = _prepared(path)
+    fitted_views = [view for view in views if view.view.split == "fitted"]
+    rotations, places = table_rotations(ROTATIONS, 0), np.linspace(0.0, 1.0, SLOPE_STEPS + 1)
+    losses = []
+    for index, importance in enumerate(places):
+        progress(f"{name}: slopes", index / len(places))
+        candidate = ArtistParameters(vpl_count=FITTED_COUNT, density_importance=float(importance))
+        losses.append(
+            fit_falloff(rotated_views(runtime, fitted_views, candidate, rotations), candidate)[1].loss
+        )
+    trend = np.polynomial.Polynomial.fit(places, losses, 2)
+    agree = np.mean(np.sign(np.diff(losses)) == np.sign(np.diff(trend(places))))
+    return Row("density_slope_agreement", float(agree), "share of steps", "a coin", 0.5)
+
+
+def write_curves(folder: Path, curves: Sequence[SceneCurves]) -> None:
+    """curves.json, and curves.png with a panel for each scene."""
+    # Here: matplotlib takes half a second to load.
+    from matplotlib.figure import Figure
+
+    document = {
+        scene.name: {
+            "uniform": scene.uniform,
+            "default": scene.default,
+            "fitted": scene.fitted,
+            "parameters": scene.parameters.as_dict(),
+        }
+        for scene in curves
+    }
+    write_text_whole(folder / "curves.json", json.dumps(document, indent=1) + "\n")
+    columns = min(3, len(curves))
+    lines = -(-len(curves) // columns)
+    figure = Figure(figsize=(4.0 * columns, 3.2 * lines), layout="constrained")
+    panels = figure.subplots(lines, columns, squeeze=False).ravel()
+    for axes, scene in zip(panels, curves, strict=False):
+        for label in ("uniform", "default", "fitted"):
+            curve = getattr(scene, label)
+            axes.loglog(list(curve), list(curve.values()), "o-", markersize=3, label=label)
+        axes.set(title=scene.name, xlabel="VPLs", ylabel="relMSE")
+        axes.grid(which="both", alpha=0.2)
+        axes.legend()
+    with written_whole(folder / "curves.png") as temporary:
+        figure.savefig(temporary, dpi=100)
+
+
+def _prepared(path: Path) -> tuple[Runtime, tuple[CapturedView, ...]]:
+    config = TunedConfig(ArtistParameters(vpl_count=FITTED_COUNT), visibility="maps")
+    prepared = prepare_scene(path, SceneOptions(size=SIZE), config, Stopwatch(), lambda stage, share: None)
+    return prepared.runtime, prepared.views
+
+
+def _error(runtime: Runtime, views: Sequence[CapturedView], parameters: ArtistParameters) -> float:
+    rotations = table_rotations(ROTATIONS, 0, held_out=True)
+    return float(rotation_errors(runtime, views, parameters, rotations).mean())
+
+
+def _main(names: Sequence[str]) -> None:
+    def progress(stage: str, share: float) -> None:
+        print(f"{stage} {share:.0%}", file=sys.stderr)
+
+    curves = [measured_curves(name, present_scenes()[name], progress) for name in names]
+    write_curves(REPOSITORY / "out" / "density" / "-".join(names), curves)
+    for row in curve_rows(curves):
+        print(f"{row.name:45s} {row.value:10.4g} {row.against_value:10.4g} {row.ratio:8.3f}  {row.against}")
+
+
+if __name__ == "__main__":
+    _main(sys.argv[1:])

@@ -2,6 +2,7 @@
 // their RSMs.
 #include "common/gbuffer.glsl"
 #include "common/rsm.glsl"
+#include "common/shadow.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -10,46 +11,6 @@ layout(rgba32f, binding = 0) writeonly uniform image2D out_irradiance;
 uniform int light_count;
 uniform sampler2D light_accumulation;
 uniform float accumulation_unit;  // irradiance [W/m²] of a stored 1; 0 where there is nothing to add
-
-// Shadow bias in RSM texels, so that it holds at every scale and resolution: the receiver is moved off its
-// surface by NORMAL_BIAS texels, and a blocker must stand DEPTH_BIAS texels in front of it.
-const float NORMAL_BIAS = 1.5;
-const float DEPTH_BIAS = 0.5;
-
-int face_towards(Light light, vec3 position_world) {
-    int best = light.faces.x;
-    float best_depth = -1.0;
-    for (int i = light.faces.x; i < light.faces.x + light.faces.y; ++i) {
-        float depth = -normalize(world_to_face(rsm_faces[i], position_world)).z;
-        if (depth > best_depth) { best_depth = depth; best = i; }
-    }
-    return best;
-}
-
-// Share of the light that arrives: percentage-closer filtering (Reeves et al. 1987) of the four nearest texels.
-float shadow(Light light, Receiver receiver, vec3 to_light) {
-    int face_index = face_towards(light, receiver.position_world);
-    RsmFace face = rsm_faces[face_index];
-    float depth = -world_to_face(face, receiver.position_world).z;
-    float texel_size = max(face.extent.x, face.extent.y) * (2.0 / RSM_RESOLUTION) * (face.orthographic != 0 ? 1.0 : depth);
-    float cosine = clamp(dot(receiver.normal_world, to_light), 0.0, 1.0);
-    float sine = sqrt(1.0 - cosine * cosine);
-    vec3 moved = receiver.position_world + receiver.normal_world * (NORMAL_BIAS * sine * texel_size);
-    vec3 position_face = world_to_face(face, moved);
-    float moved_depth = -position_face.z - DEPTH_BIAS * texel_size;
-    vec2 ndc = position_face.xy / (face.extent * (face.orthographic != 0 ? 1.0 : -position_face.z));
-    vec2 texel = (ndc * 0.5 + 0.5) * RSM_RESOLUTION - 0.5;
-    ivec2 corner = ivec2(floor(texel));
-    vec2 blend = texel - vec2(corner);
-    ivec2 origin = rsm_tile_origin(face_index);
-    float lit[4];
-    for (int i = 0; i < 4; ++i) {
-        ivec2 at = clamp(corner + ivec2(i & 1, i >> 1), ivec2(0), ivec2(RSM_RESOLUTION - 1));
-        float stored = texelFetch(rsm_depth, origin + at, 0).r;
-        lit[i] = stored > 0.0 && rsm_view_depth(face, stored) < moved_depth ? 0.0 : 1.0;
-    }
-    return mix(mix(lit[0], lit[1], blend.x), mix(lit[2], lit[3], blend.x), blend.y);
-}
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);

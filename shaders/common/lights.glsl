@@ -21,9 +21,20 @@ struct RsmFace {
     float near_or_range;  // perspective: near plane; orthographic: range
     int light;
     int orthographic;
+#ifndef LIGHT_COUNT
     int padding[3];
+#endif
 };
 
+#ifdef LIGHT_COUNT  // WebGL has no storage buffers; std140 pads a face to the same 96 bytes
+layout(std140) uniform Lights {
+    Light lights[LIGHT_COUNT];
+};
+
+layout(std140) uniform RsmFaces {
+    RsmFace rsm_faces[RSM_FACE_COUNT];
+};
+#else
 layout(std430, binding = LIGHTS_BINDING) readonly buffer Lights {
     Light lights[];
 };
@@ -31,6 +42,7 @@ layout(std430, binding = LIGHTS_BINDING) readonly buffer Lights {
 layout(std430, binding = RSM_FACES_BINDING) readonly buffer RsmFaces {
     RsmFace rsm_faces[];
 };
+#endif
 
 // KHR_lights_punctual, "Inner and Outer Cone Angles".
 float cone_falloff(Light light, vec3 direction_from_light) {

@@ -35,8 +35,8 @@ RsmTexel rsm_texel(ivec2 texel) {
     }
     RsmFace face = rsm_faces[face_index];
     Light light = lights[face.light];
-    vec2 ndc = (vec2(texel - tile * RSM_RESOLUTION) + 0.5) * (2.0 / RSM_RESOLUTION) - 1.0;
-    vec2 side = face.extent * (2.0 / RSM_RESOLUTION);
+    vec2 ndc = (vec2(texel - tile * RSM_RESOLUTION) + 0.5) * (2.0 / float(RSM_RESOLUTION)) - 1.0;
+    vec2 side = face.extent * (2.0 / float(RSM_RESOLUTION));
     float view_depth = rsm_view_depth(face, depth);
 
     float flux_factor; // solid angle, or area across the beam
@@ -69,7 +69,7 @@ vec3 rsm_position_on_plane(RsmTexel texel, vec2 place) {
     ivec2 tile = ivec2(place) / RSM_RESOLUTION;
     RsmFace face = rsm_faces[tile.y * rsm_columns + tile.x];
     mat3 rotation = mat3(face.light_to_world);
-    vec2 ndc = (place - vec2(tile * RSM_RESOLUTION)) * (2.0 / RSM_RESOLUTION) - 1.0;
+    vec2 ndc = (place - vec2(tile * RSM_RESOLUTION)) * (2.0 / float(RSM_RESOLUTION)) - 1.0;
     vec3 across = rotation * vec3(ndc * face.extent, 0.0);
     vec3 start = face.light_to_world[3].xyz;
     vec3 ray = -rotation[2];

@@ -1,0 +1,82 @@
+// VPLs from points of a table, by inverting the running sums of the sampling weights. Needs common/rsm.glsl and
+// common/virtual_point_lights.glsl, and of whoever includes it: `sum_in_row(row, column)` and `sum_of_rows(row)`, the
+// sums up to and with a column or row; `sampling_weight(texel, flux)`, `total_weight`, `vpl_count` and `rows`.
+
+const VirtualPointLight NO_VPL = VirtualPointLight(vec4(0.0), vec4(0.0, 0.0, 1.0, 0.0), vec4(0.0));
+
+// First index whose running sum exceeds `target`.
+int row_above(float target) {
+    int low = 0;
+    int high = rows - 1;
+    while (low < high) {
+        int middle = (low + high) / 2;
+        if (sum_of_rows(middle) > target) { high = middle; } else { low = middle + 1; }
+    }
+    return low;
+}
+
+int column_above(int row, int last, float target) {
+    int low = 0;
+    int high = last;
+    while (low < high) {
+        int middle = (low + high) / 2;
+        if (sum_in_row(row, middle) > target) { high = middle; } else { low = middle + 1; }
+    }
+    return low;
+}
+
+// A VPL at a texel, with flux and area of the RSM_FILTERING² texels around it, of its face, in the mean: so that
+// it has the colour of its surroundings, not that of a speckle which the light's next move replaces. Weighted by
+// the chance of each, sum(flux) / sum(weight) keeps the energy: among texels of one chance it is the plain mean.
+VirtualPointLight texel_vpl(ivec2 texel, vec2 within) {
+    RsmTexel surface = rsm_texel(texel);
+    if (!(mean_flux(surface.flux) > 0.0)) {
+        return NO_VPL; // rounding of the sums may find a dark texel beside a lit one
+    }
+    const int reach = RSM_FILTERING / 2;
+    ivec2 tile_low = texel / RSM_RESOLUTION * RSM_RESOLUTION;
+    ivec2 low = max(texel - reach, tile_low);
+    ivec2 high = min(texel + reach, tile_low + RSM_RESOLUTION - 1);
+    float weight = 0.0;
+    float area = 0.0;
+    vec3 flux = vec3(0.0);
+    for (int y = low.y; y <= high.y; ++y) {
+        for (int x = low.x; x <= high.x; ++x) {
+            RsmTexel near = rsm_texel(ivec2(x, y));
+            float near_flux = mean_flux(near.flux);
+            if (near_flux > 0.0) {
+                weight += sampling_weight(ivec2(x, y), near_flux);
+                area += near.area;
+                flux += near.flux;
+            }
+        }
+    }
+    // N · p, with p = weight / total_weight the chance of all these texels in one draw.
+    float draws = float(vpl_count) * weight / total_weight;
+    area /= draws;
+#if RSM_FILTERING > 1
+    // What the inversion leaves over of the table's point is the place in the texel: as light or density shift,
+    // a VPL slides where it would jump from centre to centre.
+    surface.position_world = rsm_position_on_plane(surface, vec2(texel) + within);
+#endif
+    return VirtualPointLight(
+        vec4(surface.position_world, sqrt(area / PI)), vec4(surface.normal_world, area), vec4(flux / draws, 0.0));
+}
+
+// The VPL at a point of the table, in [0, 1)².
+VirtualPointLight placed_vpl(vec2 point) {
+    if (!(total_weight > 0.0)) {
+        return NO_VPL;
+    }
+    int last = rsm_columns * RSM_RESOLUTION - 1;
+    vec2 target = point;
+    target.y *= total_weight;
+    int row = row_above(target.y);
+    target.x *= sum_in_row(row, last);
+    int column = column_above(row, last, target.x);
+    vec2 low = vec2(column > 0 ? sum_in_row(row, column - 1) : 0.0, row > 0 ? sum_of_rows(row - 1) : 0.0);
+    vec2 high = vec2(sum_in_row(row, column), sum_of_rows(row));
+    // The maximum guards the quotient where rounding finds a texel of no weight.
+    vec2 within = clamp((target - low) / max(high - low, vec2(1e-30)), 0.0, 1.0);
+    return texel_vpl(ivec2(column, row), within);
+}

@@ -92,6 +92,20 @@ def scene_bundle(
     return SceneBundle(document, bytes(binary.content))
 
 
+def left_out(config: TunedConfig) -> tuple[str, ...]:
+    """What of a config is not drawn outside the runtime, a sentence each."""
+    sentences = []
+    if config.visibility == "maps":
+        sentences.append(
+            "Visibility maps are drawn by the runtime alone: elsewhere light passes through walls"
+        )
+    if config.parameters.screen_space_strength > 0.0:
+        sentences.append("The screen-space near field is drawn by the runtime alone")
+    if config.parameters.density_importance > 0.0:
+        sentences.append("Outside the runtime VPLs are placed by flux alone: the same mean, more noise")
+    return tuple(sentences)
+
+
 def write_bundle(folder: Path, bundle: SceneBundle) -> None:
     """Write `bundle.json` and `bundle.bin` into `folder`, each whole or not at all, the document last.
 

@@ -37,8 +37,9 @@ CONFIG = TunedConfig(
 def textured_room():
     """The room with a texture on its coloured walls: repeated, mirrored, minified."""
     room = colored_room()
-    v, u = np.mgrid[0:32, 0:32]
-    texels = np.stack([255 - 7 * u, 40 + 6 * v, 128 + 4 * ((u + v) % 32)], axis=-1).astype(np.uint8)
+    v, u = np.mgrid[0:32, 0:32] * (2.0 * np.pi / 32)
+    waves = np.stack([np.sin(u), np.cos(v), np.sin(u + v)], axis=-1)
+    texels = np.round(160.0 + 90.0 * waves).astype(np.uint8)
     coordinates = np.float32([[0, 0], [3, 0], [3, 2], [0, 2]])
     return dataclasses.replace(
         room,

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from renderer.tuned_config import TunedConfig
     from tuner.commands.view_flags import ViewFlags
 
-Form = Literal["json", "glsl", "c", "std140", "gltf", "bundle"]
-WITH_SCENE = ("gltf", "bundle")
-WITH_VIEW = ("bundle",)
+Form = Literal["json", "glsl", "c", "std140", "gltf", "bundle", "web"]
+WITH_SCENE = ("gltf", "bundle", "web")
+WITH_VIEW = ("bundle", "web")
 
 
 def export(
@@ -43,7 +43,7 @@ def export(
         Form,
         typer.Option(
             help="Normalised JSON; GLSL constants or uniform block; a C header; the bytes of that block; the "
-            "extras of a copy of --scene; or all that a program needs to draw --scene, as JSON and one .bin."
+            "extras of a copy of --scene; what it takes to draw --scene, as JSON and .bin; a web page of it."
         ),
     ],
     output: Annotated[
@@ -52,7 +52,7 @@ def export(
     ],
     scene: Annotated[
         Path | None,
-        typer.Option(metavar="SCENE", help="gltf, bundle: the scene.", show_default=False),
+        typer.Option(metavar="SCENE", help="gltf, bundle, web: the scene.", show_default=False),
     ] = None,
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Picture size. [960x540]")] = None,
     visibility: VisibilityOption = None,
@@ -93,11 +93,15 @@ def export(
     if to not in WITH_SCENE and scene is not None:
         raise InputError(f"--scene: --to {to} takes none")
     if to not in WITH_VIEW and (flags != ViewFlags() or views or view or size):
-        raise InputError(f"--to {to}: takes no camera, light, view or size; --to {WITH_VIEW[0]} does")
+        raise InputError(
+            f"--to {to}: takes no camera, light, view or size; --to {' and '.join(WITH_VIEW)} do"
+        )
+    if to == "web" and output.suffix.lower() != ".html":
+        raise InputError(f"{output}: the file name must end in .html, got {output.suffix or 'no suffix'!r}")
     config = read_config(file).seen_by(visibility)
     if to in WITH_VIEW:
         assert scene is not None
-        _write_with_view(config, output, _bundle(config, scene, size, views, view, flags))
+        _write_with_view(config, to, output, _bundle(config, scene, size, views, view, flags))
     else:
         _write(config, to, output, scene)
     document = {
@@ -157,18 +161,13 @@ def _bundle(
     return scene_bundle(loaded, drawn, config)
 
 
-def _write_with_view(config: "TunedConfig", output: Path, bundle: "SceneBundle") -> None:
-    from renderer.scene_bundle import write_bundle
+def _write_with_view(config: "TunedConfig", to: Form, output: Path, bundle: "SceneBundle") -> None:
+    from renderer.atomic_file import write_text_whole
+    from renderer.scene_bundle import left_out, write_bundle
+    from renderer.web_page import web_page
 
-    warn(undrawn(config))
-    write_bundle(output, bundle)
-
-
-def undrawn(config: "TunedConfig") -> tuple[str, ...]:
-    """What of a config the reader of a bundle leaves out, a line each."""
-    lines = []
-    if config.parameters.screen_space_strength > 0.0:
-        lines.append("the screen-space near field is not drawn outside the runtime")
-    if config.parameters.density_importance > 0.0:
-        lines.append("VPLs are placed by flux alone outside the runtime, with the same mean and more noise")
-    return tuple(lines)
+    warn(left_out(config))
+    if to == "bundle":
+        write_bundle(output, bundle)
+    else:
+        write_text_whole(output, web_page(bundle, left_out(config)))

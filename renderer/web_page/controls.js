@@ -1,0 +1,220 @@
+// --- what is on the page, and what keys and pointers do -----------------------------------------------------------
+const element = (id) => document.getElementById(id);
+const LIVE = ["intensity", "falloff_footprint", "falloff_transmittance", "density_exponent"];
+
+class Page {
+  constructor(frame) {
+    this.frame = frame;
+    this.exposure = null;
+    this.chosenLight = 0;
+    this.waiting = [];
+    this.makeParameters();
+    this.makeLights();
+    this.listen();
+    this.reset();
+  }
+
+  reset() {
+    this.camera = clone(bundle.view.camera_to_world);
+    this.lights = clone(bundle.lights);
+    this.faces = clone(bundle.rsm.faces);
+    const middle = add(center, column(this.camera, 3), -1);
+    this.distance = Math.max(-dot(middle, column(this.camera, 2)), 0.05 * bundle.diagonal);
+    element("exposure").value = 0;
+    this.showExposure();
+    this.exposure = null;
+    this.choose(bundle.config.parameters, "tuned");
+  }
+
+  // Take a set of parameters; VPLs are counted as the export has them, so that both are at one cost.
+  choose(parameters, name) {
+    this.parameters = { ...parameters, vpl_count: bundle.config.parameters.vpl_count };
+    for (const id of ["tuned", "default"]) element(id).setAttribute("aria-pressed", String(id === name));
+    for (const key of LIVE) this.showParameter(key);
+    this.change({ light: true });
+  }
+
+  // Draw anew: with other VPLs, from another place, or only with other parameters.
+  change({ light = false, camera = false }) {
+    this.lightChanged = this.lightChanged || light;
+    this.cameraChanged = this.cameraChanged || camera || light;
+    this.gathered = 0;
+    if (!this.asked) this.asked = requestAnimationFrame(() => this.step());
+  }
+
+  step() {
+    this.asked = 0;
+    const { vpl_count } = this.parameters;
+    if (this.lightChanged) this.frame.drawLights(this, this.parameters);
+    if (this.cameraChanged) this.frame.drawCamera(this.camera);
+    this.lightChanged = this.cameraChanged = false;
+    if (this.gathered < vpl_count) {
+      const end = Math.min(this.gathered + BATCH, vpl_count);
+      this.frame.gather(this.camera, this.parameters, this.gathered, end);
+      this.gathered = end;
+    }
+    // The table's points are as evenly spread in every prefix: some VPLs, brightened, stand for all.
+    this.frame.resolve(vpl_count / this.gathered);
+    const finished = this.gathered === vpl_count;
+    if (this.exposure === null && finished) this.exposure = this.frame.measuredExposure();
+    this.frame.show((this.exposure ?? this.frame.measuredExposure()) * 2 ** element("exposure").valueAsNumber);
+    element("status").textContent = `${bundle.view.size.join(" × ")} pixels, ${this.gathered} of ${vpl_count} VPLs`;
+    if (!finished) this.asked = requestAnimationFrame(() => this.step());
+    else this.waiting.splice(0).forEach((resolve) => resolve());
+  }
+
+  finished() {
+    return this.asked ? new Promise((resolve) => this.waiting.push(resolve)) : Promise.resolve();
+  }
+
+  orbit(yaw, pitch) {
+    const pivot = add(column(this.camera, 3), column(this.camera, 2), -this.distance);
+    const up = column(this.camera, 2)[1] * Math.sign(-pitch);
+    this.camera = turned(this.camera, pivot, [0, 1, 0], yaw);
+    // Not over the pole, where up would turn over.
+    if (up > -0.98) this.camera = turned(this.camera, pivot, column(this.camera, 0), pitch);
+    this.change({ camera: true });
+  }
+
+  approach(factor) {
+    const step = this.distance * (1 - factor);
+    const moved = add(column(this.camera, 3), column(this.camera, 2), -step);
+    moved.forEach((value, i) => { this.camera[i][3] = value; });
+    this.distance *= factor;
+    this.change({ camera: true });
+  }
+
+  // Right, up and backward as the camera has them, in shares of the diagonal.
+  moveLight(right, up, backward) {
+    let by = [0, 0, 0];
+    [right, up, backward].forEach((amount, i) => { by = add(by, column(this.camera, i), amount); });
+    moveLight(this, this.chosenLight, this.lights[this.chosenLight].type === "directional" ? [right, up, backward] : by);
+    this.showLight();
+    this.change({ light: true });
+  }
+
+  makeParameters() {
+    for (const spec of bundle.table.filter((row) => LIVE.includes(row.name))) {
+      const label = document.createElement("label");
+      label.htmlFor = spec.name;
+      label.title = spec.meaning;
+      label.append(`${spec.symbol} ${spec.name.replaceAll("_", " ")}`);
+      const output = document.createElement("output");
+      output.id = `${spec.name}-value`;
+      label.append(output);
+      const slider = document.createElement("input");
+      const onScale = spec.scale === "log" ? Math.log : (value) => value;
+      Object.assign(slider, { type: "range", id: spec.name, min: onScale(spec.low), max: onScale(spec.high), step: "any" });
+      slider.addEventListener("input", () => {
+        const value = slider.valueAsNumber;
+        this.parameters[spec.name] = spec.scale === "log" ? Math.exp(value) : value;
+        output.textContent = this.parameters[spec.name].toPrecision(3);
+        for (const id of ["tuned", "default"]) element(id).setAttribute("aria-pressed", "false");
+        this.change({ light: spec.name === "density_exponent" });
+      });
+      element("parameters").append(label, slider);
+    }
+  }
+
+  showParameter(name) {
+    const spec = bundle.table.find((row) => row.name === name);
+    const value = this.parameters[name];
+    element(name).value = spec.scale === "log" ? Math.log(value) : value;
+    element(`${name}-value`).textContent = `${value.toPrecision(3)} ${spec.unit === "1" ? "" : spec.unit}`;
+  }
+
+  makeLights() {
+    this.lights = clone(bundle.lights);
+    bundle.lights.forEach((light, i) => {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.textContent = `${i + 1}: ${light.type}`;
+      button.addEventListener("click", () => { this.chosenLight = i; this.showLight(); });
+      element("lights").append(button);
+    });
+    this.showLight();
+  }
+
+  showLight() {
+    [...element("lights").children].forEach((button, i) => {
+      button.setAttribute("aria-pressed", String(i === this.chosenLight));
+    });
+    const light = this.lights[this.chosenLight];
+    const [word, vector] = light.type === "directional" ? ["along", light.direction] : ["at", light.position];
+    element("light-place").textContent = `${word} ${vector.map((value) => value.toPrecision(3)).join(", ")}`;
+  }
+
+  showExposure() {
+    const stops = element("exposure").valueAsNumber;
+    element("exposure-value").textContent = `${stops > 0 ? "+" : ""}${stops.toFixed(1)} stops`;
+  }
+
+  listen() {
+    const exposure = element("exposure");
+    const expose = () => {
+      this.showExposure();
+      if (!this.asked) this.asked = requestAnimationFrame(() => this.step());
+    };
+    exposure.addEventListener("input", expose);
+    const tuned = () => this.choose(bundle.config.parameters, "tuned");
+    const plain = () => this.choose(Object.fromEntries(bundle.table.map((row) => [row.name, row.default])), "default");
+    element("tuned").addEventListener("click", tuned);
+    element("default").addEventListener("click", plain);
+    element("reset").addEventListener("click", () => this.reset());
+    const brighten = (stops) => { exposure.value = exposure.valueAsNumber + stops; expose(); };
+    const keys = {
+      ArrowLeft: () => this.orbit(-0.05, 0), ArrowRight: () => this.orbit(0.05, 0),
+      ArrowUp: () => this.orbit(0, -0.05), ArrowDown: () => this.orbit(0, 0.05),
+      "+": () => this.approach(0.93), "=": () => this.approach(0.93), "-": () => this.approach(1.07),
+      a: () => this.moveLight(-0.02, 0, 0), d: () => this.moveLight(0.02, 0, 0),
+      w: () => this.moveLight(0, 0.02, 0), s: () => this.moveLight(0, -0.02, 0),
+      q: () => this.moveLight(0, 0, 0.02), e: () => this.moveLight(0, 0, -0.02),
+      "[": () => brighten(-0.2), "]": () => brighten(0.2), r: () => this.reset(),
+      t: () => (element("tuned").getAttribute("aria-pressed") === "true" ? plain() : tuned()),
+    };
+    document.addEventListener("keydown", (event) => {
+      const action = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+      // A focused slider has the arrows.
+      if (!action || event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === "INPUT") return;
+      event.preventDefault();
+      action();
+    });
+    canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
+    canvas.addEventListener("pointermove", (event) => {
+      if (!canvas.hasPointerCapture(event.pointerId)) return;
+      const [x, y] = [event.movementX / canvas.clientWidth, event.movementY / canvas.clientHeight];
+      if (event.shiftKey) this.moveLight(x, -y, 0);
+      else this.orbit(-4 * x, -3 * y);
+    });
+    canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.approach(1.001 ** event.deltaY);
+    }, { passive: false });
+  }
+}
+
+function describe() {
+  element("name").textContent = bundle.scene;
+  element("note").textContent = bundle.note;
+  const rows = { visibility: bundle.config.visibility, ...bundle.config.parameters, ...bundle.config.provenance };
+  for (const [name, value] of Object.entries(rows)) {
+    const [term, text] = [document.createElement("dt"), document.createElement("dd")];
+    term.textContent = name.replaceAll("_", " ");
+    text.textContent = String(value);
+    element("provenance").append(term, text);
+  }
+}
+
+async function start() {
+  describe();
+  if (!gl) throw new Error("this browser has no WebGL 2");
+  if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("this graphics driver draws no float pictures");
+  const frame = new Frame(makeScene(await binaryBytes()));
+  window.vpltune = new Page(frame);
+  await window.vpltune.finished();
+}
+
+window.started = start().catch((error) => {
+  element("status").textContent = `Cannot draw: ${error.message}`;
+  throw error;
+});

@@ -1,0 +1,380 @@
+"use strict";
+// Draws the exported scene as the runtime does: G-buffer, RSM, VPLs, gather, direct light, tone curve. VPLs are made
+// anew only when the light moves; they are gathered a batch at a time, so that a slow machine stays answerable.
+
+const bundle = JSON.parse(document.getElementById("bundle").textContent);
+const shaders = JSON.parse(document.getElementById("shaders").textContent);
+const BATCH = 32;
+const FULLSCREEN = "web/fullscreen.vert";
+
+async function binaryBytes() {
+  const text = atob(document.getElementById("binary").textContent.trim());
+  const packed = Uint8Array.from(text, (character) => character.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+// --- vectors and matrices; matrices are rows, as mathematics writes them ------------------------------------------
+const add = (a, b, scale = 1) => a.map((value, i) => value + scale * b[i]);
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const normalized = (a) => a.map((value) => value / Math.hypot(...a));
+const column = (matrix, i) => [matrix[0][i], matrix[1][i], matrix[2][i]];
+const transposed = (matrix) => matrix[0].map((_, i) => matrix.map((row) => row[i]));
+const columnMajor = (matrix) => new Float32Array(transposed(matrix).flat());
+function rigidInverse(matrix) {
+  const axes = [0, 1, 2].map((i) => column(matrix, i));
+  return [...axes.map((axis) => [...axis, -dot(axis, column(matrix, 3))]), [0, 0, 0, 1]];
+}
+function rotated(vector, axis, angle) {  // Rodrigues
+  const [c, s] = [Math.cos(angle), Math.sin(angle)];
+  const along = dot(axis, vector) * (1 - c);
+  const across = cross(axis, vector);
+  return vector.map((value, i) => value * c + across[i] * s + axis[i] * along);
+}
+function turned(matrix, center, axis, angle) {
+  const columns = [0, 1, 2].map((i) => rotated(column(matrix, i), axis, angle));
+  columns.push(add(center, rotated(add(column(matrix, 3), center, -1), axis, angle)));
+  return [...transposed(columns), [0, 0, 0, 1]];
+}
+
+// --- WebGL --------------------------------------------------------------------------------------------------------
+const canvas = document.getElementById("picture");
+[canvas.width, canvas.height] = bundle.view.size;
+const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, preserveDrawingBuffer: true });
+
+function makeProgram(vertex, fragment) {
+  const program = gl.createProgram();
+  for (const [kind, name] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+    const shader = gl.createShader(kind);
+    gl.shaderSource(shader, shaders[name]);
+    gl.compileShader(shader);
+    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(`${name}: ${gl.getShaderInfoLog(shader)}`);
+    gl.attachShader(program, shader);
+  }
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(`${fragment}: ${gl.getProgramInfoLog(program)}`);
+  const uniforms = {};
+  for (let i = 0; i < gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); ++i) {
+    const { name, type } = gl.getActiveUniform(program, i);
+    uniforms[name] = { type, place: gl.getUniformLocation(program, name) };
+  }
+  for (const [name, binding] of [["Lights", 0], ["RsmFaces", 1]]) {
+    const block = gl.getUniformBlockIndex(program, name);
+    if (block !== gl.INVALID_INDEX) gl.uniformBlockBinding(program, block, binding);
+  }
+  return { program, uniforms };
+}
+
+const SETTERS = {
+  [WebGL2RenderingContext.FLOAT]: (place, value) => gl.uniform1f(place, value),
+  [WebGL2RenderingContext.INT]: (place, value) => gl.uniform1i(place, value),
+  [WebGL2RenderingContext.FLOAT_VEC2]: (place, value) => gl.uniform2fv(place, value),
+  [WebGL2RenderingContext.FLOAT_VEC3]: (place, value) => gl.uniform3fv(place, value),
+  [WebGL2RenderingContext.INT_VEC2]: (place, value) => gl.uniform2iv(place, value),
+  [WebGL2RenderingContext.FLOAT_MAT4]: (place, value) => gl.uniformMatrix4fv(place, false, columnMajor(value)),
+};
+
+// Use a program with its uniforms; a texture among them gets a unit of its own.
+function use({ program, uniforms }, values) {
+  gl.useProgram(program);
+  let unit = 0;
+  for (const [name, { type, place }] of Object.entries(uniforms)) {
+    const value = values[name];
+    if (value === undefined) continue;
+    if (value instanceof WebGLTexture) {
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, value);
+      gl.uniform1i(place, unit++);
+    } else {
+      SETTERS[type](place, value);
+    }
+  }
+}
+
+function floatTexture(width, height, format) {
+  const texture = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  gl.texStorage2D(gl.TEXTURE_2D, 1, gl[format], width, height);
+  for (const side of ["MIN", "MAG"]) gl.texParameteri(gl.TEXTURE_2D, gl[`TEXTURE_${side}_FILTER`], gl.NEAREST);
+  return texture;
+}
+
+// Textures of the given formats, to be drawn into together.
+function makeTarget(width, height, formats, withDepth = false) {
+  const textures = formats.map((format) => floatTexture(width, height, format));
+  const framebuffer = gl.createFramebuffer();
+  gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+  const places = textures.map((_, i) => gl.COLOR_ATTACHMENT0 + i);
+  textures.forEach((texture, i) => gl.framebufferTexture2D(gl.FRAMEBUFFER, places[i], gl.TEXTURE_2D, texture, 0));
+  if (withDepth) {
+    const depth = gl.createRenderbuffer();
+    gl.bindRenderbuffer(gl.RENDERBUFFER, depth);
+    gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH_COMPONENT32F, width, height);
+    gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, depth);
+  }
+  gl.drawBuffers(places);
+  if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE) throw new Error("float targets are missing");
+  return { width, height, textures, framebuffer, withDepth };
+}
+
+function fill(target, program, values) {
+  gl.bindFramebuffer(gl.FRAMEBUFFER, target ? target.framebuffer : null);
+  gl.viewport(0, 0, target ? target.width : canvas.width, target ? target.height : canvas.height);
+  gl.disable(gl.DEPTH_TEST);
+  gl.bindVertexArray(null);
+  use(program, values);
+  gl.drawArrays(gl.TRIANGLES, 0, 3);
+}
+
+// --- the scene ----------------------------------------------------------------------------------------------------
+function makeScene(bytes) {
+  const part = (name) => bytes.subarray(bundle.arrays[name].offset, bundle.arrays[name].offset + bundle.arrays[name].bytes);
+  const vertices = gl.createVertexArray();
+  gl.bindVertexArray(vertices);
+  ["positions", "normals", "uv", "base_colors"].forEach((name, place) => {
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, part(name), gl.STATIC_DRAW);
+    gl.enableVertexAttribArray(place);
+    gl.vertexAttribPointer(place, bundle.arrays[name].shape[1], gl.FLOAT, false, 0, 0);
+  });
+  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, part("triangles"), gl.STATIC_DRAW);
+  gl.bindVertexArray(null);
+  const anisotropic = gl.getExtension("EXT_texture_filter_anisotropic");
+  const textures = bundle.textures.map((entry) => {
+    const texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+    // SRGB8 has no mipmaps made for it in WebGL 2; with an alpha of 255 it has.
+    const rgba = new Uint8Array(entry.size[0] * entry.size[1] * 4).fill(255);
+    for (let i = 0; i < rgba.length / 4; ++i) rgba.set(bytes.subarray(entry.offset + 3 * i, entry.offset + 3 * i + 3), 4 * i);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.SRGB8_ALPHA8, ...entry.size, 0, gl.RGBA, gl.UNSIGNED_BYTE, rgba);
+    gl.generateMipmap(gl.TEXTURE_2D);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+    ["S", "T"].forEach((side, i) => {
+      gl.texParameteri(gl.TEXTURE_2D, gl[`TEXTURE_WRAP_${side}`], entry.repeat[i] ? gl.REPEAT : gl.CLAMP_TO_EDGE);
+    });
+    if (anisotropic) gl.texParameterf(gl.TEXTURE_2D, anisotropic.TEXTURE_MAX_ANISOTROPY_EXT, 8);
+    return texture;
+  });
+  return { vertices, textures };
+}
+
+// Draw all triangles as seen along −Z of a rigid matrix; the target's depth is reversed.
+function drawScene(scene, program, toWorld, extent, orthographic, values) {
+  const [x, y, z, one] = rigidInverse(toWorld);
+  const scaled = (row, by) => row.map((value) => value / by);
+  const toClip = [scaled(x, extent[0]), scaled(y, extent[1]), [0, 0, 0, 0], orthographic ? one : scaled(z, -1)];
+  gl.enable(gl.DEPTH_TEST);
+  gl.depthFunc(gl.GREATER);
+  gl.bindVertexArray(scene.vertices);
+  for (const draw of bundle.draws) {
+    const { mirrored } = bundle.textures[draw.texture];
+    use(program, { ...values, to_clip: toClip, base_color_texture: scene.textures[draw.texture], mirrored });
+    gl.drawElements(gl.TRIANGLES, 3 * draw.count, gl.UNSIGNED_INT, 12 * draw.first);
+  }
+}
+
+function clear(target) {
+  gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+  target.textures.forEach((_, i) => gl.clearBufferfv(gl.COLOR, i, [0, 0, 0, 0]));
+  gl.clearBufferfv(gl.DEPTH, 0, [0]);
+}
+
+// --- lights -------------------------------------------------------------------------------------------------------
+const KINDS = { spot: 0, point: 1, directional: 2 };
+const center = [0, 1, 2].map((i) => (bundle.bounds[0][i] + bundle.bounds[1][i]) / 2);
+const clone = (value) => JSON.parse(JSON.stringify(value));
+
+function lightBlocks(lights, faces) {
+  const light = new DataView(new ArrayBuffer(64 * lights.length));
+  const face = new DataView(new ArrayBuffer(96 * faces.length));
+  const floats = (view, at, values) => values.forEach((value, i) => view.setFloat32(at + 4 * i, value, true));
+  lights.forEach((entry, i) => {
+    const [inner, outer] = [Math.cos(entry.inner_cone), Math.cos(entry.outer_cone)];
+    floats(light, 64 * i, [...entry.position, KINDS[entry.type], ...entry.direction, 1 / Math.max(inner - outer, 1e-6)]);
+    floats(light, 64 * i + 32, [...entry.intensity, outer]);
+    light.setInt32(64 * i + 48, faces.findIndex((other) => other.light === i), true);
+    light.setInt32(64 * i + 52, faces.filter((other) => other.light === i).length, true);
+  });
+  faces.forEach((entry, i) => {
+    floats(face, 96 * i, [...columnMajor(entry.light_to_world), ...entry.extent, entry.near_or_range]);
+    face.setInt32(96 * i + 76, entry.light, true);
+    face.setInt32(96 * i + 80, entry.orthographic ? 1 : 0, true);
+  });
+  return [light, face];
+}
+
+// Move one light by a vector in units of the scene's diagonal; a sun turns instead, about the scene's middle.
+function moveLight(state, index, by) {
+  const light = state.lights[index];
+  if (light.type !== "directional") {
+    const offset = by.map((value) => value * bundle.diagonal);
+    light.position = add(light.position, offset);
+    for (const face of state.faces.filter((other) => other.light === index)) {
+      offset.forEach((value, i) => { face.light_to_world[i][3] += value; });
+    }
+    return;
+  }
+  const sideways = normalized(cross(light.direction, Math.abs(light.direction[1]) < 0.99 ? [0, 1, 0] : [1, 0, 0]));
+  const [yaw, pitch] = [3 * by[0] - 3 * by[2], 3 * by[1]];
+  light.direction = normalized(rotated(rotated(light.direction, [0, 1, 0], yaw), sideways, pitch));
+  for (const face of state.faces.filter((other) => other.light === index)) {
+    face.light_to_world = turned(turned(face.light_to_world, center, [0, 1, 0], yaw), center, sideways, pitch);
+    // Whichever way it turns, it now holds the whole scene.
+    const half = bundle.diagonal * 0.505;
+    face.extent = [half, half];
+    face.near_or_range = 2 * half;
+    add(center, column(face.light_to_world, 2), half).forEach((value, i) => { face.light_to_world[i][3] = value; });
+  }
+}
+
+// --- the frame ----------------------------------------------------------------------------------------------------
+class Frame {
+  constructor(scene) {
+    this.scene = scene;
+    const [width, height] = bundle.view.size;
+    const [rows, columns] = bundle.rsm.atlas;
+    const programs = { geometry: "web/scene.vert", reflective_shadow_map: "web/scene.vert" };
+    this.programs = {};
+    for (const name of Object.keys(shaders).filter((key) => key.endsWith(".frag"))) {
+      const key = name.slice(4, -5);
+      this.programs[key] = makeProgram(programs[key] || FULLSCREEN, name);
+    }
+    this.gbuffer = makeTarget(width, height, ["RG32F", "RGBA16F", "R32F"], true);
+    this.rsm = makeTarget(columns, rows, ["RG32F", "RGBA16F", "R32F"], true);
+    this.weights = makeTarget(columns, rows, ["R32F", "RGBA32F", "R32F"]);
+    this.sums = [0, 1].map(() => makeTarget(columns, rows, ["R32F"]));
+    this.totals = [0, 1].map(() => makeTarget(1, rows, ["R32F"]));
+    this.moments = [];
+    for (let [w, h] = [columns, rows]; w > 1 || h > 1;) {
+      [w, h] = [Math.ceil(w / 8), Math.ceil(h / 8)];
+      this.moments.push(makeTarget(w, h, ["RGBA32F", "R32F"]));
+    }
+    const most = bundle.config.parameters.vpl_count;
+    this.vpls = makeTarget(bundle.vpl_columns, Math.ceil(most / bundle.vpl_columns), ["RGBA32F", "RGBA32F", "RGBA32F"]);
+    this.indirect = [0, 1].map(() => makeTarget(width, height, ["RGBA32F"]));
+    this.direct = makeTarget(width, height, ["RGBA32F"]);
+    this.radiance = makeTarget(width, height, ["RGBA32F"]);
+    this.pointTable = this.makePointTable(this.vpls.width, this.vpls.height);
+    this.blocks = [0, 1].map(() => gl.createBuffer());
+  }
+
+  makePointTable(width, height) {
+    const points = new Float32Array(2 * width * height);
+    for (let i = 0; i < points.length; ++i) {
+      const value = (0.5 + ((i >> 1) + 1) * bundle.point_table.steps[i & 1]) % 1;
+      points[i] = Math.min(value, 1 - 2 ** -24);
+    }
+    const texture = floatTexture(width, height, "RG32F");
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, gl.RG, gl.FLOAT, points);
+    return texture;
+  }
+
+  get rsmValues() {
+    const [rsm_normal, rsm_reflectance, rsm_depth] = this.rsm.textures;
+    const { resolution, atlas, faces } = bundle.rsm;
+    return { rsm_normal, rsm_reflectance, rsm_depth, rsm_columns: atlas[1] / resolution, rsm_face_count: faces.length };
+  }
+
+  cameraValues(camera) {
+    const { tan_half_fov, near_plane } = bundle.view;
+    const [gbuffer_normal, gbuffer_albedo, gbuffer_depth] = this.gbuffer.textures;
+    return { gbuffer_normal, gbuffer_albedo, gbuffer_depth, camera_to_world: camera, tan_half_fov, near_plane };
+  }
+
+  // RSMs, and the VPLs that are drawn from them.
+  drawLights(state, parameters) {
+    lightBlocks(state.lights, state.faces).forEach((block, i) => {
+      gl.bindBuffer(gl.UNIFORM_BUFFER, this.blocks[i]);
+      gl.bufferData(gl.UNIFORM_BUFFER, block, gl.DYNAMIC_DRAW);
+      gl.bindBufferBase(gl.UNIFORM_BUFFER, i, this.blocks[i]);
+    });
+    clear(this.rsm);
+    const { resolution } = bundle.rsm;
+    state.faces.forEach((face, face_index) => {
+      gl.viewport(face.origin[1], face.origin[0], resolution, resolution);
+      gl.enable(gl.SCISSOR_TEST);
+      gl.scissor(face.origin[1], face.origin[0], resolution, resolution);
+      const { light_to_world, extent, orthographic } = face;
+      drawScene(this.scene, this.programs.reflective_shadow_map, light_to_world, extent, orthographic, { face_index });
+      gl.disable(gl.SCISSOR_TEST);
+    });
+    this.sumWeights(state, parameters);
+    const [rows] = bundle.rsm.atlas;
+    const vpl_count = parameters.vpl_count;
+    const sums = { sums_in_rows: this.sumsInRows, sums_of_rows: this.sumsOfRows, rows, vpl_count };
+    const values = { ...this.rsmValues, ...sums, density_exponent: parameters.density_exponent };
+    fill(this.vpls, this.programs.virtual_point_lights, { ...values, point_table: this.pointTable });
+  }
+
+  sumWeights(state, parameters) {
+    const { density_exponent } = parameters;
+    const moment_origin = column(state.faces[0].light_to_world, 3);
+    fill(this.weights, this.programs.vpl_weights, { ...this.rsmValues, density_exponent, moment_origin });
+    const [rows, columns] = bundle.rsm.atlas;
+    this.sumsInRows = this.runningSum(this.weights.textures[0], this.sums, columns, [1, 0]);
+    fill(this.totals[1], this.programs.running_sum, { values: this.sumsInRows, reach: [0, 0], first: [columns - 1, 0] });
+    this.sumsOfRows = this.runningSum(this.totals[1].textures[0], this.totals, rows, [0, 1]);
+    let [, flux_position, flux_square] = this.weights.textures;
+    for (const target of this.moments) {
+      fill(target, this.programs.moment_sums, { flux_position, flux_square });
+      [flux_position, flux_square] = target.textures;
+    }
+    this.momentSums = { flux_position, flux_square };
+  }
+
+  runningSum(values, targets, length, axis) {
+    for (let reach = 1, i = 0; reach < length; reach *= 2, i = 1 - i) {
+      fill(targets[i], this.programs.running_sum, { values, reach: axis.map((one) => one * reach), first: [0, 0] });
+      values = targets[i].textures[0];
+    }
+    return values;
+  }
+
+  drawCamera(camera) {
+    clear(this.gbuffer);
+    gl.viewport(0, 0, this.gbuffer.width, this.gbuffer.height);
+    const values = { world_to_camera: rigidInverse(camera), near_plane: bundle.view.near_plane, eye_world: column(camera, 3) };
+    drawScene(this.scene, this.programs.geometry, camera, bundle.view.tan_half_fov, false, values);
+    fill(this.direct, this.programs.direct_light, { ...this.cameraValues(camera), ...this.rsmValues });
+  }
+
+  // Add the VPLs from `first` to `end` to the picture.
+  gather(camera, parameters, first, end) {
+    const [vpl_position_footprint, vpl_normal_area, vpl_flux] = this.vpls.textures;
+    const [target, earlier] = this.indirect;
+    const falloff_transmittance = bundle.config.visibility === "none" ? 0 : parameters.falloff_transmittance;
+    fill(target, this.programs.vpl_gather, {
+      ...this.cameraValues(camera), ...parameters, ...this.momentSums, falloff_transmittance, first, end,
+      vpl_position_footprint, vpl_normal_area, vpl_flux, earlier: earlier.textures[0],
+    });
+    this.indirect.reverse();
+  }
+
+  resolve(indirect_share) {
+    fill(this.radiance, this.programs.material_resolve, {
+      gbuffer_albedo: this.gbuffer.textures[1], direct_irradiance: this.direct.textures[0],
+      indirect_irradiance: this.indirect[1].textures[0], indirect_share,
+    });
+  }
+
+  // Exposure that brings the mean luminance of what is seen to the key: read back, so not every frame.
+  measuredExposure() {
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.radiance.framebuffer);
+    const pixels = new Float32Array(4 * canvas.width * canvas.height);
+    gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.FLOAT, pixels);
+    let [luminance, covered] = [0, 0];
+    for (let i = 0; i < pixels.length; i += 4) {
+      luminance += 0.2126 * pixels[i] + 0.7152 * pixels[i + 1] + 0.0722 * pixels[i + 2];
+      covered += pixels[i + 3];
+    }
+    return luminance > 0 ? (bundle.view.exposure_key * covered) / luminance : 1;
+  }
+
+  show(exposure) {
+    fill(null, this.programs.tone_mapping, { radiance: this.radiance.textures[0], exposure });
+  }
+}

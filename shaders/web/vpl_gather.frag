@@ -1,0 +1,34 @@
+// Indirect irradiance from some of the VPLs, added to what earlier ones gave.
+#include "common/gbuffer.glsl"
+#include "common/virtual_point_lights.glsl"
+#include "web/scene_length.glsl"
+
+const float PI = 3.14159265358979;
+#include "common/vpl_irradiance.glsl"
+#include "web/vpl_texture.glsl"
+
+uniform sampler2D earlier;
+uniform int first;
+uniform int end;
+uniform float intensity;
+uniform float falloff_footprint;
+uniform float falloff_transmittance;
+
+layout(location = 0) out vec4 out_irradiance;
+
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    Receiver receiver = gbuffer_receiver(pixel);
+    out_irradiance = first > 0 ? texelFetch(earlier, pixel, 0) : vec4(0.0);
+    if (!receiver.valid) {
+        return;
+    }
+    FalloffParameters parameters = FalloffParameters(intensity, falloff_footprint, falloff_transmittance);
+    float scene_length = measured_scene_length();
+    vec3 irradiance = vec3(0.0);
+    for (int i = first; i < end; ++i) {
+        irradiance += vpl_irradiance(
+            receiver.position_world, receiver.normal_world, vpl_at(i), scene_length, parameters);
+    }
+    out_irradiance.rgb += irradiance;
+}

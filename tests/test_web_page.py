@@ -1,0 +1,221 @@
+"""The exported page in a real browser: the runtime's picture, moved by keys and pointer, nothing fetched."""
+
+import base64
+import dataclasses
+import io
+import json
+import re
+
+import numpy as np
+import pytest
+from built_scenes import ROOM_LIGHTS, room_view
+from headless_chromium import headless_chromium
+from PIL import Image
+from test_standalone_reader import CONFIG, SCENES, textured_room
+
+import renderer
+from renderer.camera_uniforms import camera_uniforms
+from renderer.errors import InputError
+from renderer.light_faces import light_records
+from renderer.scene import Camera
+from renderer.scene_bundle import left_out, scene_bundle
+from renderer.tuned_config import TunedConfig
+from renderer.web_page import web_page
+from tuner.__main__ import run
+
+SOFTWARE_GL = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+RESOLUTION = 256
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with headless_chromium(*SOFTWARE_GL) as browser:
+        yield browser
+
+
+@pytest.fixture
+def opened(browser, tmp_path):
+    """Opens a page's text as a file, and hands back the browser's page once the picture is whole."""
+    pages, asked, complaints = [], [], []
+
+    def open_page(text, **options):
+        path = tmp_path / "page.html"
+        path.write_text(text, encoding="utf-8")
+        page = browser.new_page(**options)
+        pages.append(page)
+        page.on("request", lambda request: asked.append(request.url))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("console", lambda message: message.type == "error" and complaints.append(message.text))
+        page.goto(path.as_uri())
+        page.evaluate("window.started")
+        return page
+
+    yield open_page
+    for page in pages:
+        page.close()
+    assert complaints == []
+    # The page itself, and not one thing more; its icon is inside.
+    assert [url for url in asked if not url.startswith(("file://", "data:"))] == []
+    assert len([url for url in asked if url.startswith("file://")]) == len(pages)
+
+
+def web_view(light, size=(96, 72)):
+    """A view of the room in which no edge runs along a row of pixel centres."""
+    view = room_view(light, size)
+    to_world = view.camera.to_world.copy()
+    to_world[:3, 3] += 0.0137, 0.0071, 0.0
+    return dataclasses.replace(view, camera=Camera(to_world, view.camera.yfov))
+
+
+def picture_of(page):
+    page.evaluate("vpltune.finished()")
+    encoded = page.evaluate("document.getElementById('picture').toDataURL('image/png')").split(",")[1]
+    return np.asarray(Image.open(io.BytesIO(base64.b64decode(encoded))).convert("RGB")).astype(int)
+
+
+def page_text(scene, view, config=CONFIG):
+    return web_page(scene_bundle(scene, view, config, rsm_resolution=RESOLUTION), left_out(config))
+
+
+def assert_same(picture, ours):
+    """To 3/255 in all but one pixel in 200; where a surface or a shadow ends, of some pixel beside.
+
+    Rasterisers snap corners to grids of their own, and differ in which side an edge pixel shows.
+    """
+    assert np.ptp(ours) > 100
+    ours = ours.astype(int)
+    padded = np.pad(ours, ((1, 1), (1, 1), (0, 0)), mode="edge")
+    height, width, _ = ours.shape
+    beside = np.stack([padded[y : y + height, x : x + width] for y in range(3) for x in range(3)])
+    outside = np.maximum(beside.min(axis=0) - picture, picture - beside.max(axis=0)).max(axis=-1)
+    assert (outside > 3).mean() < 0.005, f"{(outside > 3).mean():.2%} differ, by up to {outside.max()}"
+    difference = np.abs(picture - ours).max(axis=-1)
+    assert (difference > 3).mean() < 0.03, f"{(difference > 3).mean():.2%} on edges"
+    assert np.median(difference) <= 1
+
+
+def assert_same_picture(page, scene, view, config=CONFIG):
+    assert_same(picture_of(page), renderer.Runtime(scene, config, rsm_resolution=RESOLUTION).render(view))
+
+
+@pytest.mark.parametrize("light", ["spot", "wide_spot", "point", "directional"])
+def test_the_picture_is_the_runtimes(opened, light):
+    scene, view = textured_room(), web_view(light)
+    assert_same_picture(opened(page_text(scene, view)), scene, view)
+
+
+def test_it_goes_on_being_the_runtimes_when_things_move(opened):
+    """Camera and light by keys, parameters by a button; the runtime draws from where things then are."""
+    scene, view = textured_room(), web_view("spot", (96, 72))
+    page = opened(page_text(scene, view))
+    for key in ("ArrowLeft", "ArrowLeft", "ArrowUp", "+", "d", "d", "s"):
+        page.keyboard.press(key)
+    page.keyboard.press("r")
+    assert_same_picture(page, scene, view)
+    for key in ("ArrowLeft", "ArrowLeft", "ArrowUp", "-", "d", "s"):
+        page.keyboard.press(key)
+    moved = page.evaluate("({ camera: vpltune.camera, lights: vpltune.lights })")
+    camera = Camera(np.array(moved["camera"]), view.camera.yfov)
+    assert np.linalg.norm(camera.position_world - view.camera.position_world) > 0.1
+    light = dataclasses.replace(view.lights[0], position_world=np.array(moved["lights"][0]["position"]))
+    assert np.linalg.norm(light.position_world - view.lights[0].position_world) > 0.05
+    there = dataclasses.replace(view, camera=camera, lights=(light,))
+    exposure = page.evaluate("vpltune.exposure")
+    ours = renderer.Runtime(scene, CONFIG, rsm_resolution=RESOLUTION).render(there, exposure=exposure)
+    assert_same(picture_of(page), ours)
+    page.keyboard.press("t")
+    assert page.get_attribute("#default", "aria-pressed") == "true"
+    plain = dataclasses.replace(CONFIG.parameters.__class__(), vpl_count=CONFIG.parameters.vpl_count)
+    ours = renderer.Runtime(scene, TunedConfig(plain), rsm_resolution=RESOLUTION).render(
+        there, exposure=exposure
+    )
+    assert_same(picture_of(page), ours)
+
+
+def test_a_sun_turns_and_several_lights_are_chosen_among(opened):
+    view = dataclasses.replace(
+        web_view("spot", (48, 36)), lights=(ROOM_LIGHTS["directional"], ROOM_LIGHTS["point"])
+    )
+    page = opened(page_text(textured_room(), view))
+    before, place = picture_of(page), page.inner_text("#light-place")
+    page.keyboard.press("d")
+    assert page.inner_text("#light-place") != place
+    assert (picture_of(page) != before).any()
+    assert np.hypot.reduce(page.evaluate("vpltune.lights[0].direction")) == pytest.approx(1.0)
+    page.click("text=2: point")
+    assert page.inner_text("#light-place").startswith("at ")
+
+
+def test_exposure_pointer_and_sliders(opened):
+    page = opened(page_text(textured_room(), web_view("spot", (48, 36))))
+    plain = picture_of(page)
+    page.keyboard.press("]")
+    assert page.inner_text("#exposure-value") == "+0.2 stops"
+    assert picture_of(page).mean() > plain.mean()
+    page.keyboard.press("r")
+    assert (picture_of(page) == plain).all()
+    box = page.locator("#picture").bounding_box()
+    page.mouse.move(box["x"] + 50, box["y"] + 50)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 120, box["y"] + 60, steps=3)
+    page.mouse.up()
+    assert (picture_of(page) != plain).any()
+    page.click("#reset")
+    page.locator("#intensity").fill("2.5")
+    assert picture_of(page).mean() > plain.mean()
+    assert page.get_attribute("#tuned", "aria-pressed") == "false"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_is_legible_in_the_dark_and_on_a_small_screen(opened, scheme):
+    view = web_view("spot", (48, 36))
+    page = opened(
+        page_text(textured_room(), view), color_scheme=scheme, viewport={"width": 400, "height": 800}
+    )
+    style = "getComputedStyle(document.body)"
+    colors = page.evaluate(f"[{style}.color, {style}.backgroundColor]")
+    ink, paper = (np.mean([int(part) for part in re.findall(r"\d+", color)[:3]]) for color in colors)
+    assert (paper - ink if scheme == "light" else ink - paper) > 150
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_names_cannot_break_out_and_what_is_left_out_is_said(opened):
+    name = "</script><script>document.title='broken'</script>"
+    config = dataclasses.replace(CONFIG, visibility="maps", provenance={"scene": name})
+    page = opened(
+        page_text(dataclasses.replace(textured_room(), name=name), web_view("spot", (16, 12)), config)
+    )
+    assert page.title() == f"{name} – VPLtune"
+    assert page.inner_text("h1") == name
+    assert "Visibility maps are drawn by the runtime alone" in page.inner_text("#note")
+
+
+def test_the_command_writes_one_file(tmp_path, capfd):
+    output, scene = tmp_path / "page.html", str(SCENES / "gallery.glb")
+    assert (
+        run(["export", "default", "--to", "web", "--scene", scene, "-o", str(output), "--size", "64x48"]) == 0
+    )
+    text = output.read_text(encoding="utf-8")
+    assert output.stat().st_size < 8e6
+    assert not re.search(r"(src|href)=\"(?!data:)", text)
+    document = json.loads(re.search(r'<script id="bundle"[^>]*>(.*?)</script>', text, re.S).group(1))
+    assert document["scene"] == "gallery"
+    assert run(["export", "default", "--to", "web", "--scene", scene, "-o", str(tmp_path / "page.htm")]) == 2
+    assert "must end in .html" in capfd.readouterr().err
+
+
+def test_a_view_without_light_is_refused():
+    view = web_view(None, (16, 12))
+    with pytest.raises(InputError, match="must have a light"):
+        web_page(scene_bundle(textured_room(), view, CONFIG))
+
+
+def test_the_bundles_faces_and_camera_are_the_runtimes():
+    scene, view = textured_room(), web_view("point", (16, 12))
+    document = scene_bundle(scene, view, CONFIG, rsm_resolution=64).document
+    faces = light_records(view.lights, scene.bounds()).faces
+    for face, theirs in zip(faces, document["rsm"]["faces"], strict=True):
+        np.testing.assert_array_equal(face["light_to_world"].T, np.float32(theirs["light_to_world"]))
+    assert (
+        document["view"]["near_plane"] == camera_uniforms(view.camera, view.size, scene.bounds()).near_plane
+    )

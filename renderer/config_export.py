@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Literal, get_args
 
 from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters, ParameterSpec
+from renderer.errors import InputError
 from renderer.parameter_block import BLOCK_BYTES, BLOCK_FIELDS, pack_parameters
 from renderer.tuned_config import VISIBILITIES, TunedConfig, config_text
 
@@ -17,8 +18,10 @@ def exported(config: TunedConfig, export_format: ExportFormat) -> bytes:
     """The contents of the exported file.
 
     Raises:
-        InputError: a value is out of range.
+        InputError: a value is out of range, or the form has no place for a prior.
     """
+    if export_format != "json":
+        refuse_prior(config, export_format)
     if export_format == "std140":
         return pack_parameters(config.parameters)
     texts: dict[ExportFormat, Callable[[TunedConfig], str]] = {
@@ -27,6 +30,15 @@ def exported(config: TunedConfig, export_format: ExportFormat) -> bytes:
         "c": c_header,
     }
     return texts[export_format](config).encode("ascii")
+
+
+def refuse_prior(config: TunedConfig, form: str) -> None:
+    """Raise InputError where a config has a prior, for forms that hold parameters alone."""
+    if config.auto is not None:
+        raise InputError(
+            f"--to {form}: a config with 'auto' sets its parameters anew in each frame; "
+            "fit a scene from it first: vpltune fit SCENE --config auto"
+        )
 
 
 def glsl_constants(config: TunedConfig) -> str:

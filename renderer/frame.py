@@ -2,10 +2,12 @@
 
 G-buffer ► lights ► RSM ► importance ► VPLs ► visibility maps ► gather ► filter ► screen-space
 ► resolve ► tone curve.
+With a prior, scene statistics and from them parameters come before the gather.
 """
 
 import moderngl
 import numpy as np
+from jaxtyping import Float32
 
 from renderer import buffer_bindings
 from renderer.artist_parameters import ArtistParameters
@@ -14,11 +16,13 @@ from renderer.dynamic_lights import DynamicLights
 from renderer.light_faces import FACE_DTYPE, LIGHT_DTYPE, FaceSnapping, LightRecords, light_records
 from renderer.light_pre_pass import LightPrePass
 from renderer.parameter_buffer import ParameterBuffer
+from renderer.passes.auto_parameters import AutoParametersPass
 from renderer.passes.direct_light import DirectLightPass
 from renderer.passes.geometry import GeometryPass
 from renderer.passes.interleaved_filter import InterleavedFilterPass
 from renderer.passes.material_resolve import MaterialResolvePass
 from renderer.passes.reflective_shadow_map import ReflectiveShadowMapPass
+from renderer.passes.scene_statistics import SceneStatisticsPass
 from renderer.passes.screen_space_indirect import BLOCK as SCREEN_SPACE_BLOCK
 from renderer.passes.screen_space_indirect import ScreenSpaceIndirectPass
 from renderer.passes.tone_mapping import ToneMappingPass
@@ -56,6 +60,7 @@ class Frame:
         vpl_count: int,
         options: RuntimeOptions,
         hierarchy: RayHierarchy | None = None,
+        auto_parameters: AutoParametersPass | None = None,
     ):
         self._context = context
         self._scene = scene
@@ -87,6 +92,10 @@ class Frame:
         if hierarchy is not None:
             self.vpl_visibility_maps = VplVisibilityMapsPass(context, vpl_count, options.visibility_map_size)
         map_size = options.visibility_map_size if hierarchy is not None else 0
+        self._auto_parameters = auto_parameters
+        self._scene_statistics: SceneStatisticsPass | None = None
+        if auto_parameters is not None:
+            self._scene_statistics = SceneStatisticsPass(context, map_size)
         self._vpl_gather = VplGatherPass(context, options.interleave, map_size)
         self._interleaved_filter: InterleavedFilterPass | None = None
         if options.interleave > 1:
@@ -121,6 +130,7 @@ class Frame:
         self._direct_light.draw(
             camera, self.gbuffer, self.rsm, len(view.lights), accumulated, self.direct_irradiance
         )
+        self._set_auto_parameters(camera)
         self._gather(camera)
         self.indirect_irradiance = self.vpl_irradiance
         if parameters.screen_space_strength > 0.0:
@@ -145,6 +155,14 @@ class Frame:
         """The exposure of the display picture: waits for the GPU."""
         return self._tone_mapping.read_exposure()
 
+    def read_statistics(self, view: View) -> Float32[np.ndarray, "statistics"]:
+        """The statistics of `view`, which has just been drawn: waits for the GPU."""
+        if self._scene_statistics is None:
+            map_size = 0 if self.vpl_visibility_maps is None else self.vpl_visibility_maps.size
+            self._scene_statistics = SceneStatisticsPass(self._context, map_size)
+        self._scene_statistics.draw(self.camera(view), self.gbuffer, self.virtual_point_lights.count)
+        return self._scene_statistics.read()
+
     def camera(self, view: View) -> CameraUniforms:
         """The view's camera as the shaders know it."""
         return camera_uniforms(view.camera, self.size, self._scene.bounds())
@@ -154,6 +172,11 @@ class Frame:
             self._hierarchy.update()
             low, high = self._scene.bounds()
             self.vpl_visibility_maps.draw(self._hierarchy, float(np.linalg.norm(high - low)))
+
+    def _set_auto_parameters(self, camera: CameraUniforms) -> None:
+        if self._auto_parameters is not None and self._scene_statistics is not None:
+            self._scene_statistics.draw(camera, self.gbuffer, self.virtual_point_lights.count)
+            self._auto_parameters.draw()
 
     def _gather(self, camera: CameraUniforms) -> None:
         count, picture = self.virtual_point_lights.count, self.vpl_irradiance

@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 
 import moderngl
 import numpy as np
+from jaxtyping import Float32
 
 from renderer.animation import Pose
 from renderer.artist_parameters import ArtistParameters
@@ -17,6 +18,7 @@ from renderer.frame import Frame, frame_light_records
 from renderer.frame_timing import FrameTiming, frame_milliseconds
 from renderer.gpu_context import check_errors, create_context, free_dropped
 from renderer.light_faces import face_count
+from renderer.passes.auto_parameters import AutoParametersPass
 from renderer.ray_hierarchy import RayHierarchy
 from renderer.runtime_options import RuntimeOptions
 from renderer.scene import Scene
@@ -75,16 +77,29 @@ class Runtime:
     ):
         loaded = config if isinstance(config, TunedConfig) else read_config(config)
         self.options = options
-        self.parameters: ArtistParameters = loaded.parameters
+        self._parameters = loaded.parameters
         self.visibility: Visibility = loaded.visibility
         self._context = create_context() if context is None else context
         self.opengl_renderer: str = self._context.info["GL_RENDERER"]
         self._rsm_resolution = rsm_resolution
         self._context.__enter__()
         self.scene_buffers = SceneBuffers(self._context, scene)
+        # Not the frame's: it remembers where the parameters stand when size or lights change.
+        self._auto_parameters: AutoParametersPass | None = None
+        if loaded.auto is not None:
+            self._auto_parameters = AutoParametersPass(self._context, loaded.auto, options.adaptation_frames)
         self._hierarchy: RayHierarchy | None = None
         self._scene = scene
-        self._frames: dict[tuple[tuple[int, int], int, int, bool], Frame] = {}
+        self._frames: dict[tuple[tuple[int, int], int, int, bool, bool], Frame] = {}
+
+    @property
+    def parameters(self) -> ArtistParameters:
+        """The config's. Setting them takes the place of its prior, if it has one."""
+        return self._parameters
+
+    @parameters.setter
+    def parameters(self, parameters: ArtistParameters) -> None:
+        self._parameters, self._auto_parameters = parameters, None
 
     @_on_own_context
     def render(
@@ -180,10 +195,27 @@ class Runtime:
         Raises:
             ValueError: there was none yet.
         """
-        if not self._frames:
-            raise ValueError("exposure: no picture has been drawn yet")
-        (frame,) = self._frames.values()
-        return frame.read_exposure()
+        return self._last_frame("exposure").read_exposure()
+
+    @_on_own_context
+    def drawn_parameters(self) -> ArtistParameters:
+        """What the last picture was drawn with, where a prior sets them: waits for the GPU.
+
+        Raises:
+            ValueError: there was none yet.
+        """
+        if self._auto_parameters is None:
+            return self._parameters
+        return self._last_frame("drawn_parameters").parameters.read()
+
+    @_on_own_context
+    def scene_statistics(self, view: View) -> Float32[np.ndarray, "statistics"]:
+        """What `renderer.scene_statistics` names, of the view that was drawn last: waits for the GPU.
+
+        Raises:
+            ValueError: there was none yet.
+        """
+        return self._last_frame("scene_statistics").read_statistics(view)
 
     @_on_own_context
     def pose(self, pose: Pose) -> None:
@@ -223,7 +255,8 @@ class Runtime:
 
     def _frame(self, size: tuple[int, int], face_count: int) -> Frame:
         maps = self.visibility == "maps"
-        key = (size, face_count, self.parameters.vpl_count, maps)
+        auto = self._auto_parameters
+        key = (size, face_count, self.parameters.vpl_count, maps, auto is not None)
         if key not in self._frames:
             # One frame's targets at a time: pictures of many sizes must not add up in GPU memory.
             self._frames.clear()
@@ -240,8 +273,15 @@ class Runtime:
                 self.parameters.vpl_count,
                 self.options,
                 self._hierarchy if maps else None,
+                auto,
             )
         return self._frames[key]
+
+    def _last_frame(self, asked: str) -> Frame:
+        if not self._frames:
+            raise ValueError(f"{asked}: no picture has been drawn yet")
+        (frame,) = self._frames.values()
+        return frame
 
     def _face_resolution(self, face_count: int) -> int:
         if self._rsm_resolution is not None:

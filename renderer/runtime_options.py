@@ -41,11 +41,18 @@ class RuntimeOptions:
     """Whether a directional light's RSM keeps its grid while bounds move: its size changes in steps, its
     place by whole texels. Otherwise it fits the bounds, and shadows and VPLs crawl with them."""
 
+    adaptation_frames: float = 0.0
+    """Time constant, in frames, over which the parameters of a config with a prior (`auto`) follow what is
+    measured. 0 takes what each picture asks for, as a still needs it; a clip or a game has 15, a quarter of a
+    second, and then no parameter moves by more than `passes.auto_parameters.LARGEST_STEP` a frame."""
+
     def __post_init__(self) -> None:
         if self.interleave not in INTERLEAVES:
             raise ValueError(f"interleave: must be one of {INTERLEAVES}, got {self.interleave!r}")
         if not 4 <= self.visibility_map_size <= 64:
             raise ValueError(f"visibility_map_size: must be in [4, 64], got {self.visibility_map_size!r}")
+        if not 0.0 <= self.adaptation_frames <= 1e4:
+            raise ValueError(f"adaptation_frames: must be in [0, 10000], got {self.adaptation_frames!r}")
         if self.light_path not in get_args(LightPath):
             raise ValueError(f"light_path: must be one of {get_args(LightPath)}, got {self.light_path!r}")
         if self.point_table not in get_args(PointTable):

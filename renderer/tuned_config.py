@@ -4,7 +4,9 @@
 
 `parameters` holds every name of the table in `renderer.artist_parameters` and nothing else.
 `visibility` ("none", "transmittance", "maps") says what stands for occluders; a file without it means
-"transmittance". `provenance` is optional, says where the numbers come from, and is never acted on.
+"transmittance". `auto` is optional: a learnt prior (`renderer.auto_prior`) that sets some of the parameters
+anew in every frame; it goes with "maps". `provenance` is optional, says where the numbers come from, and is
+never acted on.
 """
 
 import json
@@ -17,12 +19,15 @@ from typing import Any, Literal, get_args
 
 from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
 from renderer.atomic_file import write_text_whole
+from renderer.auto_prior import AutoPrior, auto_schema
 from renderer.errors import InputError
 from renderer.gltf_extras import GLTF_SUFFIXES, read_gltf_extras
 
 FORMAT = "vpltune"
 VERSION = 1
 DEFAULT_CONFIG_NAME = "default"
+AUTO_CONFIG_NAME = "auto"
+PRESETS = (DEFAULT_CONFIG_NAME, AUTO_CONFIG_NAME)
 # A real file is about 1 kB; the bound keeps a wrong path (a scene, a device) from being read whole.
 MAXIMUM_FILE_BYTES = 1 << 20
 LARGEST_NUMBER = sys.float_info.max
@@ -44,13 +49,24 @@ class TunedConfig:
     """What stands for occluders between VPLs and surfaces: nothing, the mean transmittance exp(−κ·d/L), or a
     small map of what each VPL sees, with the transmittance for what the maps cannot resolve."""
 
+    auto: AutoPrior | None = None
+    """What sets some of the parameters on the GPU, frame by frame; needs the visibility "maps"."""
+
     def seen_by(self, visibility: Visibility | None) -> "TunedConfig":
-        """The same config with another visibility; None keeps its own."""
+        """The same config with another visibility; None keeps its own.
+
+        Raises:
+            InputError: the config has a prior, and the visibility is not the one that it was trained with.
+        """
+        if self.auto is not None and visibility not in (None, self.visibility):
+            raise InputError(
+                f"visibility: a config with 'auto' goes with {self.visibility}, got {visibility}"
+            )
         return self if visibility is None else replace(self, visibility=visibility)
 
 
 def read_config(source: str | Path) -> TunedConfig:
-    """Read a config file, or the preset that `configs/default.json` holds for the word "default".
+    """Read a config file, or for the words "default" and "auto" the preset in configs/.
 
     A .gltf or .glb holds a config where `vpltune export --to gltf` has put one into its extras.
 
@@ -58,9 +74,9 @@ def read_config(source: str | Path) -> TunedConfig:
         InputError: the file cannot be read, is not JSON, has another format or a later version,
             repeats, lacks or adds a key, or holds a value that is not finite and in range.
     """
-    if str(source) == DEFAULT_CONFIG_NAME:
-        text = files("configs").joinpath("default.json").read_text(encoding="utf-8")
-        return parse_config(text, "configs/default.json")
+    if str(source) in PRESETS:
+        text = files("configs").joinpath(f"{source}.json").read_text(encoding="utf-8")
+        return parse_config(text, f"configs/{source}.json")
     path = Path(source)
     if path.suffix.lower() in GLTF_SUFFIXES:
         return parse_config(json.dumps(read_gltf_extras(path)), str(path))
@@ -97,6 +113,7 @@ def parse_config(text: str, where: str) -> TunedConfig:
         parameters=ArtistParameters.validated(parameters, f"{where}: parameters"),
         provenance=_checked_provenance(document.get("provenance", {}), where),
         visibility=_checked_visibility(document.get("visibility", "transmittance"), where),
+        auto=_checked_auto(document, where),
     )
 
 
@@ -122,6 +139,9 @@ def config_text(config: TunedConfig) -> str:
         "visibility": _checked_visibility(config.visibility, "config"),
         "parameters": parameters.as_dict(),
     }
+    if config.auto is not None:
+        document["auto"] = config.auto.as_dict()
+        _checked_auto(document, "config")
     if config.provenance:
         document["provenance"] = _checked_provenance(dict(config.provenance), "config")
     # Escaped to ASCII: a provenance may hold a file name that is not valid Unicode.
@@ -165,6 +185,7 @@ def config_schema() -> dict[str, Any]:
                 "enum": list(VISIBILITIES),
                 "default": "transmittance",
             },
+            "auto": auto_schema(),
             "provenance": {
                 "description": "Where the numbers come from; never acted on.",
                 "type": "object",
@@ -203,7 +224,7 @@ def _check_header(document: dict[str, Any], where: str) -> None:
         raise InputError(f"{where}: key 'version' must be a whole number from 1, got {version!r:.60}")
     if version > VERSION:
         raise InputError(f"{where}: key 'version' is {version!s:.20}, this program reads up to {VERSION}")
-    known = ("format", "version", "visibility", "parameters", "provenance")
+    known = ("format", "version", "visibility", "parameters", "auto", "provenance")
     for key in document:
         if key not in known:
             raise InputError(f"{where}: unknown key {key!r:.60}; known are {', '.join(known)}")
@@ -215,6 +236,16 @@ def _checked_visibility(visibility: Any, where: str) -> Visibility:
             f"{where}: key 'visibility' must be one of {', '.join(VISIBILITIES)}, got {visibility!r:.60}"
         )
     return visibility
+
+
+def _checked_auto(document: dict[str, Any], where: str) -> AutoPrior | None:
+    if "auto" not in document:
+        return None
+    if document.get("visibility") != "maps":
+        raise InputError(
+            f"{where}: key 'auto' goes with visibility 'maps', got {document.get('visibility')!r}"
+        )
+    return AutoPrior.validated(document["auto"], f"{where}: auto")
 
 
 def _checked_provenance(provenance: Any, where: str) -> dict[str, str | int | float]:

@@ -36,6 +36,7 @@ from tuner.commands.report import (
     stdout_sent_to_stderr,
 )
 from tuner.commands.report_page import report
+from tuner.commands.train_prior import train_prior
 
 PROGRAM = "vpltune"
 DEFECT = 1
@@ -48,7 +49,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (fit, batch, render, evaluate, export, report, doctor, bench):
+for command in (fit, batch, render, evaluate, export, report, train_prior, doctor, bench):
     app.command()(command)
 # `import` is a word of Python's own.
 app.command("import")(import_scene)

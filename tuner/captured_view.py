@@ -55,7 +55,7 @@ def capture_views(
 ) -> tuple[CapturedView, ...]:
     """Draw and read back every view."""
     return tuple(
-        CapturedView(view, reference, runtime.capture(view), runtime.parameters)
+        CapturedView(view, reference, runtime.capture(view), runtime.drawn_parameters())
         for view, reference in zip(views, references, strict=True)
     )
 

@@ -38,7 +38,6 @@ _MOST_VPLS = next(spec.high for spec in ARTIST_PARAMETERS if spec.name == "vpl_c
 def error_budget(
     prepared: PreparedScene,
     evaluation: Evaluation,
-    tuned: ArtistParameters,
     options: SceneOptions,
     progress: Callable[[float], None] | None = None,
 ) -> dict[str, float | str]:
@@ -54,16 +53,16 @@ def error_budget(
         less = references_of(prepared.scene, tuple(view.view.view for view in views), options.seed, "1")
     shares: list[dict[str, float]] = []
     for index, (view, one_bounce) in enumerate(zip(views, less, strict=True)):
-        shares.append(_of_view(prepared.runtime, view, tuned, one_bounce))
+        shares.append(_of_view(prepared.runtime, view, one_bounce))
         if progress is not None:
             progress((index + 1) / len(views))
     return {"views": "fitted"} | {cause: fmean(share[cause] for share in shares) for cause in shares[0]}
 
 
 def _of_view(
-    runtime: Runtime, evaluated: EvaluatedView, tuned: ArtistParameters, one_bounce: ReferenceView | None
+    runtime: Runtime, evaluated: EvaluatedView, one_bounce: ReferenceView | None
 ) -> dict[str, float]:
-    view = evaluated.view
+    view, tuned = evaluated.view, evaluated.tuned
     total = evaluated.metrics["tuned"].relmse
     single, endless = _errors_of_rotations(runtime, view, tuned)
     many = replace(tuned, vpl_count=int(min(MORE_VPLS * tuned.vpl_count, _MOST_VPLS)))

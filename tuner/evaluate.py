@@ -34,6 +34,7 @@ class EvaluatedView:
     """The three pictures of one view and how far each is from the reference."""
 
     view: CapturedView
+    tuned: ArtistParameters
     irradiance: dict[str, Float32[np.ndarray, "height width 3"]]
     """By variant: `default` and `tuned` as the runtime draws them, `ceiling` from the surrogate."""
     metrics: dict[str, ViewMetrics]
@@ -57,6 +58,7 @@ class Evaluation:
             {
                 "name": evaluated.view.view.name,
                 "split": evaluated.view.view.split,
+                "parameters": evaluated.tuned.as_dict(),
                 **{variant: asdict(evaluated.metrics[variant]) for variant in VARIANTS},
                 "noise_floor": evaluated.noise_floor,
                 "samples": evaluated.view.reference.samples,
@@ -80,12 +82,15 @@ def evaluate(
     runtime: Runtime,
     views: tuple[CapturedView, ...],
     default: ArtistParameters,
-    tuned: ArtistParameters,
+    tuned: ArtistParameters | None,
     *,
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
 ) -> Evaluation:
-    """Measure every view. `progress` is called with the share done, in [0, 1]."""
+    """Measure every view. `progress` is called with the share done, in [0, 1].
+
+    `tuned` None takes for each view what it was captured with, as a prior set it.
+    """
     visibilities = []
     for index, view in enumerate(views):
         visibilities.append(_visibility(scene, view))
@@ -100,7 +105,9 @@ def evaluate(
     )
     evaluated = []
     for index, (view, visibility) in enumerate(zip(views, visibilities, strict=True)):
-        evaluated.append(_evaluate_view(runtime, view, default, tuned, ceiling, visibility))
+        chosen = view.drawn_with if tuned is None else tuned
+        assert chosen is not None, "a view that a prior was captured with knows its parameters"
+        evaluated.append(_evaluate_view(runtime, view, default, chosen, ceiling, visibility))
         if progress is not None:
             progress(0.5 + 0.5 * (index + 1) / len(views))
     return Evaluation(tuple(evaluated), ceiling)
@@ -126,7 +133,7 @@ def _evaluate_view(
         )
         for name, picture in pictures.items()
     }
-    return EvaluatedView(view, pictures, metrics, noise_floor(view.reference))
+    return EvaluatedView(view, tuned, pictures, metrics, noise_floor(view.reference))
 
 
 def _visibility(scene: Scene, view: CapturedView) -> Bool[np.ndarray, "receivers vpls"]:

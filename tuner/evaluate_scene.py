@@ -44,7 +44,7 @@ def evaluate_scene(scene_path: Path, options: EvaluateOptions, progress: Progres
             prepared.runtime,
             prepared.views,
             default_like(options.tuned.parameters),
-            options.tuned.parameters,
+            None if options.tuned.auto is not None else options.tuned.parameters,
             seed=options.seed,
             progress=lambda share: progress("evaluate", share),
         )
@@ -54,7 +54,6 @@ def evaluate_scene(scene_path: Path, options: EvaluateOptions, progress: Progres
             budget["error_budget"] = error_budget(
                 prepared,
                 evaluation,
-                options.tuned.parameters,
                 options,
                 lambda share: progress("split error", share),
             )

@@ -2,12 +2,15 @@
 
 import importlib.metadata
 import platform
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
-from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
+from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters, parameter_spec
 from renderer.atomic_file import write_text_whole
+from renderer.auto_prior import AUTO_PARAMETERS, place_of, value_at
 from renderer.errors import InputError
 from renderer.strict_json import strict_json
 from renderer.tuned_config import TunedConfig, read_config, write_config
@@ -113,7 +116,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
     if options.split_error:
         with watch.stage("split error"):
             budget["error_budget"] = error_budget(
-                prepared, evaluation, tuned, options, lambda share: progress("split error", share)
+                prepared, evaluation, options, lambda share: progress("split error", share)
             )
     config = TunedConfig(tuned, _provenance(prepared, options, descent), options.start.visibility)
     write_views(output / "views.json", str(scene_path), tuple(view.view for view in prepared.views))
@@ -159,19 +162,27 @@ def _fitted(
     prepared: PreparedScene, options: FitOptions, output: Path, progress: Progress
 ) -> tuple[ArtistParameters, Descent, dict[str, Interval], tuple[CapturedView, ...], dict[str, Any]]:
     """Parameters, how the fit ended, their intervals, views captured for them, what metrics.json gains."""
-    views, start, seed = _of_fitted(prepared.views), options.start.parameters, options.seed
+    views, seed = _of_fitted(prepared.views), options.seed
+    start = fit_start(options.start, [view.drawn_with for view in views if view.drawn_with is not None])
 
     def report(share: float) -> None:
         progress("fit", share)
 
     if options.budget is not None:
         tuned, descent, found = fit_to_budget(
-            prepared, options.start, options.budget, output, seed=seed, progress=report
+            prepared,
+            replace(options.start, parameters=start, auto=None),
+            options.budget,
+            output,
+            seed=seed,
+            progress=report,
         )
     elif options.density:
         density = fit_density(prepared.runtime, views, start, seed=seed, progress=report)
         tuned, descent = density.parameters, density.descent
-        document = density_document(prepared.runtime, views, default_like(start), density, seed)
+        document = density_document(
+            prepared.runtime, views, default_like(options.start.parameters), density, seed
+        )
         found = {"density": document}
     else:
         ready = fit_views(views, start, seed=seed)
@@ -190,6 +201,17 @@ def _fitted(
 
 def _of_fitted(views: tuple[CapturedView, ...]) -> tuple[CapturedView, ...]:
     return tuple(view for view in views if view.view.split == "fitted")
+
+
+def fit_start(config: TunedConfig, drawn: Sequence[ArtistParameters]) -> ArtistParameters:
+    """The config's parameters; of a prior, the mean in the unit cube of what views were drawn with."""
+    if config.auto is None:
+        return config.parameters
+    values = {}
+    for name in AUTO_PARAMETERS:
+        spec = parameter_spec(name)
+        values[name] = value_at(spec, fmean(place_of(spec, getattr(each, name)) for each in drawn))
+    return replace(config.parameters, **values)
 
 
 def default_like(start: ArtistParameters) -> ArtistParameters:

@@ -6,10 +6,13 @@ import moderngl
 import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
+from made_priors import made_prior
 
+from renderer.artist_parameters import ArtistParameters
 from renderer.dynamic_lights import DynamicLights, point_lights
 from renderer.runtime import Runtime
 from renderer.runtime_options import RuntimeOptions
+from renderer.tuned_config import TunedConfig
 from renderer.views import View
 
 READS = {
@@ -85,6 +88,20 @@ def test_a_frame_reads_nothing_back(gl_context, calls, light_path, interleave):
     for frame in range(10):
         runtime.draw(view, lights=moving_lights(frame))
     assert not calls
+
+
+def test_parameters_that_follow_the_scene_are_not_read_back(gl_context, calls):
+    """With a prior: measured and set on the GPU, frame by frame, eased or not."""
+    config = TunedConfig(ArtistParameters(vpl_count=64), visibility="maps", auto=made_prior())
+    options = RuntimeOptions(adaptation_frames=5.0)
+    runtime = Runtime(colored_room(), config, options, context=gl_context, rsm_resolution=64)
+    runtime.draw(everything_view())
+    calls.clear()
+    for _ in range(5):
+        runtime.draw(everything_view())
+    assert not calls
+    runtime.drawn_parameters()
+    assert calls == {"Buffer.read": 1}
 
 
 def test_the_first_frame_reads_nothing_either(gl_context, calls):

@@ -48,7 +48,7 @@ def batch(
         typer.Option("-o", "--output", metavar="DIR", help="Folder for records, log, and each scene's fit."),
     ],
     config: Annotated[
-        str, typer.Option(metavar="START.json", help="Start from this config: a file, or `default`.")
+        str, typer.Option(metavar="START.json", help="Start from this config: a file, `default` or `auto`.")
     ] = "default",
     views: Annotated[
         int, typer.Option(min=1, max=LARGEST_VIEW_COUNT, help="How many views of each scene to fit.")

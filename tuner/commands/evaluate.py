@@ -29,7 +29,9 @@ from tuner.commands.report import OK, PARTLY_DONE, Report, warn
 
 def evaluate(
     scene: SceneArgument,
-    config: Annotated[str, typer.Option(metavar="FILE", help="The tuned config: a file, or `default`.")],
+    config: Annotated[
+        str, typer.Option(metavar="FILE", help="The tuned config: a file, `default` or `auto`.")
+    ],
     views: Annotated[
         str, typer.Option(metavar="N|FILE", help="How many views are fitted, or the views.json of a fit.")
     ] = "2",

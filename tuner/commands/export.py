@@ -36,7 +36,9 @@ def export(
     file: Annotated[
         str,
         typer.Argument(
-            metavar="FILE", help="A config, a glTF file that carries one, or `default`.", show_default=False
+            metavar="FILE",
+            help="A config, a glTF file that carries one, `default` or `auto`.",
+            show_default=False,
         ),
     ],
     to: Annotated[
@@ -100,6 +102,9 @@ def export(
         raise InputError(f"{output}: the file name must end in .html, got {output.suffix or 'no suffix'!r}")
     config = read_config(file).seen_by(visibility)
     if to in WITH_VIEW:
+        from renderer.config_export import refuse_prior
+
+        refuse_prior(config, to)
         assert scene is not None
         _write_with_view(config, to, output, _bundle(config, scene, size, views, view, flags))
     else:

@@ -37,7 +37,7 @@ def fit(
         typer.Option("-o", "--output", metavar="DIR", help="Folder for tuned.json, pictures and metrics."),
     ],
     config: Annotated[
-        str, typer.Option(metavar="START.json", help="Start from this config: a file, or `default`.")
+        str, typer.Option(metavar="START.json", help="Start from this config: a file, `default` or `auto`.")
     ] = "default",
     views: Annotated[int, typer.Option(min=1, max=LARGEST_VIEW_COUNT, help="How many views to fit.")] = 2,
     size: ViewSizeOption = None,

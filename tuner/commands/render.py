@@ -48,7 +48,9 @@ def render(
             help="A .png for display, or an .exr of linear float32; with --frames, an .mp4 or a folder.",
         ),
     ],
-    config: Annotated[str, typer.Option(metavar="FILE", help="A tuned config, or `default`.")] = "default",
+    config: Annotated[
+        str, typer.Option(metavar="FILE", help="A tuned config, `default` or `auto`.")
+    ] = "default",
     layer: Annotated[Layer, typer.Option(help="Which picture to draw.")] = "final",
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Picture size. [960x540]")] = None,
     visibility: VisibilityOption = None,
@@ -147,19 +149,20 @@ def render(
     sequence = Sequence(loaded, drawn, motion, factor)
     if factor != 1.0:
         loaded, drawn = scaled(loaded, factor), scaled_view(drawn, factor)
-    runtime = Runtime(
-        loaded,
-        tuned,
-        RuntimeOptions(interleave=interleave, visibility_map_size=map_size),
-        rsm_resolution=rsm_resolution,
+    options = RuntimeOptions(
+        interleave=interleave,
+        visibility_map_size=map_size,
+        # A clip is eased over a quarter of a second; a still takes what it asks for.
+        adaptation_frames=0.0 if frames is None else fps / 4.0,
     )
+    runtime = Runtime(loaded, tuned, options, rsm_resolution=rsm_resolution)
     bouncing = _bouncing_lights(loaded, drawn, dynamic_lights)
     if frames is None:
         _write_layer(runtime, drawn, layer, output, bouncing)
     else:
         write_clip(runtime, sequence, layer, output, frames, fps, bouncing)
     clip = {} if frames is None else {"frames": frames, "fps": fps}
-    return _report(scene, output, layer, tuned.parameters.as_dict(), drawn, clip)
+    return _report(scene, output, layer, runtime.drawn_parameters().as_dict(), drawn, clip)
 
 
 def _bouncing_lights(scene: "Scene", view: "View", count: int) -> "BouncingLights | None":

@@ -1,0 +1,63 @@
+"""Scene statistics: the GPU's against their twin in numpy; ratios, the same at every scale, finite always."""
+
+import numpy as np
+import pytest
+from built_scenes import ROOM_LIGHTS, colored_room, room_view
+
+from renderer.artist_parameters import ArtistParameters
+from renderer.runtime import Runtime
+from renderer.scene import Camera, look_at, scaled
+from renderer.scene_statistics import STATISTIC_NAMES
+from renderer.tuned_config import TunedConfig
+from renderer.views import View, scaled_view
+from tuner.scene_statistics import scene_statistics
+
+
+def runtime_of(context, visibility="maps", vpl_count=64, factor=1.0) -> Runtime:
+    config = TunedConfig(ArtistParameters(vpl_count=vpl_count), visibility=visibility)
+    return Runtime(scaled(colored_room(), factor), config, context=context, rsm_resolution=256)
+
+
+def measured(runtime: Runtime, view: View) -> np.ndarray:
+    runtime.draw(view)
+    return runtime.scene_statistics(view)
+
+
+@pytest.mark.parametrize("visibility", ["maps", "none"])
+@pytest.mark.parametrize("light", ROOM_LIGHTS)
+@pytest.mark.parametrize("vpl_count", [3, 300])
+def test_twins_agree(gl_context, light, visibility, vpl_count):
+    """To 2e-3: pixels at an edge of what a VPL sees, or on one plane with it, may fall either way."""
+    runtime = runtime_of(gl_context, visibility, vpl_count)
+    captured = runtime.capture(room_view(light))
+    ours = runtime.scene_statistics(room_view(light))
+    np.testing.assert_allclose(ours, scene_statistics(captured), atol=2e-3)
+
+
+@pytest.mark.parametrize("light", ROOM_LIGHTS)
+def test_statistics_have_no_unit(gl_context, light):
+    """Scene and light ×0.01 and ×100: the same ratios, to what rounding moves across an edge."""
+    plain = measured(runtime_of(gl_context), room_view(light))
+    for factor in (0.01, 100.0):
+        other = measured(runtime_of(gl_context, factor=factor), scaled_view(room_view(light), factor))
+        np.testing.assert_allclose(other, plain, atol=1e-3)
+
+
+@pytest.mark.parametrize("light", [None, *ROOM_LIGHTS])
+def test_statistics_are_ratios(gl_context, light):
+    """In [0, 1] and finite: lit, unlit, and with the camera turned away from everything."""
+    runtime = runtime_of(gl_context)
+    away = Camera(look_at(np.array([0.0, 0.0, 3.6]), np.array([0.0, 0.0, 9.0])), 0.7)
+    view = room_view(light)
+    for drawn in (view, View("away", "fitted", view.size, away, view.lights)):
+        found = measured(runtime, drawn)
+        assert np.isfinite(found).all()
+        assert (found >= 0.0).all() and (found <= 1.0).all()
+
+
+def test_darkness_has_its_own_numbers(gl_context):
+    """No light: all that could be seen is seen, and of nothing is there any."""
+    found = dict(zip(STATISTIC_NAMES, measured(runtime_of(gl_context), room_view(None)), strict=True))
+    assert found.pop("visible") == 1.0
+    assert found.pop("vpl_count") == pytest.approx(6.0 / 16.0)
+    assert not any(found.values())

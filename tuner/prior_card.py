@@ -1,0 +1,120 @@
+"""The card of a learnt prior: what it was trained on, how far off it is elsewhere, and where it fails."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from renderer.artist_parameters import parameter_spec
+from renderer.auto_prior import AUTO_PARAMETERS, value_at
+from renderer.scene_statistics import STATISTIC_NAMES
+from renderer.tuned_config import TunedConfig
+from tuner.prior_library import FITTED, HELD_OUT, VIEW_SIZE
+from tuner.prior_training import FLOOR, FOLDS
+
+if TYPE_CHECKING:
+    from tuner.train_prior import LearntPrior
+
+WORST = 8
+"""Scenes named as those where the prior does worst."""
+
+
+_CARD = """# The prior behind `--config auto`
+
+Sets {parameters} in every frame, from {statistics} ratios
+that the GPU measures of what the light meets and the camera sees. Written with its config by
+
+    {command}
+
+Trained on {scenes} scenes, {views} views each with a light position of its own, {width}×{height} pixels,
+at {counts} VPLs: {generated} generated (`tuner/scene_generator.py`), the others from files.
+
+## On scenes that it has not seen
+
+Each scene was left out, in {folds} groups in turn, from a prior trained like this one. The loss is that of a
+fit (relMSE and a share of plain squared error, through the surrogate); `fit` is the scene's own, made for its
+fitted views at that VPL count. Medians over scenes:
+
+{figures}
+
+## Where it fails
+
+The {worst_count} scenes with the largest loss over their own fit's, on views that neither was made for:
+
+{worst}
+
+It never leaves these ranges, in which it was trained:
+
+{ranges}
+{left_out}"""
+
+
+def prior_card(learnt: "LearntPrior", config: TunedConfig, left_out: dict[str, str]) -> str:
+    """Markdown."""
+    return _CARD.format(
+        parameters=", ".join(parameter_spec(name).symbol for name in AUTO_PARAMETERS),
+        statistics=len(STATISTIC_NAMES),
+        command=config.provenance.get("command", "tuner.train_prior.train_prior"),
+        scenes=len(learnt.scenes),
+        views=FITTED + HELD_OUT,
+        width=VIEW_SIZE[0],
+        height=VIEW_SIZE[1],
+        counts=", ".join(map(str, learnt.fits.vpl_counts)),
+        generated=config.provenance["generated"],
+        folds=FOLDS,
+        figures=_figures(learnt),
+        worst_count=WORST,
+        worst=_worst(learnt),
+        ranges=_ranges(learnt),
+        left_out=_left_out(left_out),
+    )
+
+
+def _ratio(learnt: "LearntPrior", of: str, against: str) -> np.ndarray:
+    """[scenes, counts, splits], with the noise of references as the floor of both."""
+    above = {name: np.maximum(learnt.losses[name], 0.0) + FLOOR for name in (of, against)}
+    return above[of] / above[against]
+
+
+def _figures(learnt: "LearntPrior") -> str:
+    over_fit, default = _ratio(learnt, "auto", "fit"), _ratio(learnt, "default", "fit")
+    beats = _ratio(learnt, "auto", "default") < 1.0
+    lines = [
+        "| VPLs | views | auto / fit | defaults / fit | scenes where auto beats the defaults |",
+        "|---|---|---|---|---|",
+    ]
+    for c, count in enumerate(learnt.fits.vpl_counts):
+        for split, views in ((0, "the fit's own"), (1, "others")):
+            auto, plain, share = (values[:, c, split] for values in (over_fit, default, beats))
+            lines.append(
+                f"| {count} | {views} | {np.median(auto):.3f} | {np.median(plain):.3f} | {share.mean():.0%} |"
+            )
+    return "\n".join(lines)
+
+
+def _worst(learnt: "LearntPrior") -> str:
+    over_fit = _ratio(learnt, "auto", "fit")[:, :, 1]
+    worst = np.argsort(-over_fit.max(axis=1))[:WORST]
+    lines = ["| scene | VPLs | loss: auto | fit | defaults |", "|---|---|---|---|---|"]
+    for scene in worst:
+        count = int(over_fit[scene].argmax())
+        auto, fit, plain = (learnt.losses[name][scene, count, 1] for name in ("auto", "fit", "default"))
+        name, vpls = learnt.scenes[scene].name, learnt.fits.vpl_counts[count]
+        lines.append(f"| {name} | {vpls} | {auto:.3f} | {fit:.3f} | {plain:.3f} |")
+    return "\n".join(lines)
+
+
+def _ranges(learnt: "LearntPrior") -> str:
+    lines = []
+    for index, name in enumerate(AUTO_PARAMETERS):
+        spec = parameter_spec(name)
+        low, high = (value_at(spec, ends[index]) for ends in (learnt.prior.lowest, learnt.prior.highest))
+        lines.append(f"- {spec.symbol} ({name}): {low:.3g} to {high:.3g}")
+    return "\n".join(lines)
+
+
+def _left_out(left_out: dict[str, str]) -> str:
+    if not left_out:
+        return ""
+    return "\n".join(
+        ["", "Files that were not used:", "", *(f"- {n}: {why}" for n, why in left_out.items()), ""]
+    )

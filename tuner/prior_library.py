@@ -1,0 +1,150 @@
+"""What a prior is trained on: scenes with references, each captured at several VPL counts, as loss tables.
+
+A scene's part is made once and kept in the user's cache folder, under all that it depends on: the scene, its
+views, and the source of what draws and measures it.
+"""
+
+import hashlib
+import io
+import json
+from dataclasses import dataclass, replace
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float32, Int32
+
+from renderer.artist_parameters import ArtistParameters
+from renderer.atomic_file import written_whole
+from renderer.runtime import Runtime
+from renderer.scene import Scene
+from renderer.tuned_config import TunedConfig
+from renderer.view_placement import views_for_scene
+from renderer.views import View, views_to_json
+from tuner.captured_view import CapturedView
+from tuner.loss_table import LossTable, loss_table
+from tuner.reference import ReferenceView, reference_views
+from tuner.reference.cache import cache_folder
+from tuner.reference.content_key import scene_digest
+
+VIEW_SIZE = (64, 48)
+FITTED, HELD_OUT = 2, 2
+"""Views of each scene, each with a camera and a light position of its own."""
+NOISE_TARGET, MAX_SAMPLES = 3e-3, 1024
+RSM_RESOLUTION = 512
+
+ROTATIONS = {16: ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1)), 64: ((0.0, 0.0), (0.3, 0.7)), 256: ((0.0, 0.0),)}
+"""VPL counts, and the rotations of the point table that each is captured with: few VPLs are noisy, and one
+placement's noise is not to be learnt."""
+
+_SOURCES = (
+    "shaders/**/*.comp",
+    "shaders/**/*.frag",
+    "shaders/**/*.glsl",
+    "shaders/**/*.vert",
+    "renderer/passes/*.py",
+    "renderer/artist_parameters.py",
+    "renderer/frame.py",
+    "renderer/light_faces.py",
+    "renderer/point_table.py",
+    "renderer/ray_hierarchy.py",
+    "renderer/scene_statistics.py",
+    "tuner/binned_gather.py",
+    "tuner/loss_table.py",
+    "tuner/losses/*.py",
+    "tuner/prior_library.py",
+    "tuner/vpl_visibility.py",
+)
+"""All that may draw or measure otherwise tomorrow."""
+
+
+@dataclass(frozen=True, eq=False)
+class PriorScene:
+    """One scene's captures: a row for each view, VPL count and rotation."""
+
+    name: str
+    statistics: Float32[np.ndarray, "rows statistics"]
+    table: LossTable
+    vpl_count: Int32[np.ndarray, "rows"]
+    fitted: Bool[np.ndarray, "rows"]
+    """Whether the row's view is one that a fit may see."""
+
+
+def prior_scene(scene: Scene) -> PriorScene:
+    """The scene's captures, from the cache or made; the scene has a camera and lights of its own.
+
+    Raises:
+        MachineError: no OpenGL.
+    """
+    views = prior_views(scene)
+    key = _key(scene, views)
+    path = cache_folder() / "prior" / f"{key}.npz"
+    if path.is_file():
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as arrays:
+            found = {name: arrays[name] for name in arrays.files}
+        table = LossTable(*(found.pop(name) for name in ("square", "product", "constant")))
+        return PriorScene(name=scene.name, table=table, **found)
+    made = _captured(scene, views, prior_references(scene, views))
+    buffer = io.BytesIO()
+    np.savez_compressed(
+        buffer,
+        statistics=made.statistics,
+        vpl_count=made.vpl_count,
+        fitted=made.fitted,
+        square=made.table.square,
+        product=made.table.product,
+        constant=made.table.constant,
+    )
+    with written_whole(path) as temporary:
+        temporary.write_bytes(buffer.getvalue())
+    return made
+
+
+def prior_views(scene: Scene) -> tuple[View, ...]:
+    """The views that a scene is learnt from, the fitted ones first."""
+    return views_for_scene(
+        scene, scene.cameras[0], scene.lights, fitted=FITTED, held_out=HELD_OUT, size=VIEW_SIZE, seed=0
+    )
+
+
+def prior_references(scene: Scene, views: tuple[View, ...]) -> tuple[ReferenceView, ...]:
+    """Their references, kept in the cache like any other."""
+    return reference_views(scene, views, noise_target=NOISE_TARGET, max_samples=MAX_SAMPLES)
+
+
+def _captured(scene: Scene, views: tuple[View, ...], references: tuple[ReferenceView, ...]) -> PriorScene:
+    statistics, tables, counts, fitted = [], [], [], []
+    for vpl_count, rotations in ROTATIONS.items():
+        parameters = replace(ArtistParameters(), vpl_count=vpl_count)
+        runtime = Runtime(scene, TunedConfig(parameters, visibility="maps"), rsm_resolution=RSM_RESOLUTION)
+        for view, reference in zip(views, references, strict=True):
+            for rotation in rotations:
+                captured = CapturedView(view, reference, runtime.capture(view, rotation))
+                statistics.append(runtime.scene_statistics(view))
+                tables.append(loss_table(captured, parameters, seed=0))
+                counts.append(vpl_count)
+                fitted.append(view.split == "fitted")
+    table = LossTable(
+        *(np.stack([getattr(table, name) for table in tables]) for name in ("square", "product", "constant"))
+    )
+    return PriorScene(scene.name, np.stack(statistics), table, np.array(counts, np.int32), np.array(fitted))
+
+
+def _key(scene: Scene, views: tuple[View, ...]) -> str:
+    content = [
+        scene_digest(scene),
+        views_to_json(scene.name, views),
+        list(ROTATIONS.items()),
+        _source_digest(),
+    ]
+    content += [NOISE_TARGET, MAX_SAMPLES, RSM_RESOLUTION]
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _source_digest() -> str:
+    digest = hashlib.sha256()
+    for pattern in _SOURCES:
+        package, _, within = pattern.partition("/")
+        for path in sorted(Path(str(resources.files(package))).glob(within)):
+            digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()

@@ -20,11 +20,12 @@ from benchmarks.scene_library import REPOSITORY, present_scenes
 from renderer.artist_parameters import ArtistParameters
 from renderer.atomic_file import write_text_whole, written_whole
 from renderer.runtime import Runtime
+from renderer.runtime_options import RuntimeOptions
 from renderer.tuned_config import TunedConfig
 from tuner.captured_view import CapturedView
 from tuner.fit_density import fit_density, rotated_views, rotation_errors, table_rotations
 from tuner.fit_falloff import fit_falloff
-from tuner.prepare_scene import SceneOptions, Stopwatch, prepare_scene
+from tuner.prepare_scene import PreparedScene, SceneOptions, Stopwatch, prepare_scene
 
 SCENES = (
     "cornell-box",
@@ -38,6 +39,7 @@ SIZE = (64, 48)
 COUNTS = (8, 16, 32, 64, 128, 256, 512, 1024)
 FITTED_COUNT = 32
 DEFAULT_COUNT = 256
+INTERLEAVES = (2, 4)
 ROTATIONS = 4
 """To fit to, and as many others to measure on."""
 SLOPE_STEPS = 20
@@ -56,6 +58,8 @@ class SceneCurves:
     uniform: Curve
     default: Curve
     fitted: Curve
+    interleaved: Curve
+    """Fitted, by side of the block: FITTED_COUNT VPLs for each pixel, side² times as many in all."""
     parameters: ArtistParameters
     """Fitted at FITTED_COUNT."""
 
@@ -93,7 +97,17 @@ def curve_rows(curves: Sequence[SceneCurves]) -> list[Row]:
                 scene.default[FITTED_COUNT],
             ),
         ]
-    for name in ("vpls_for_same_error", "tuned_32_over_default_256", "tuned_32_over_default_32"):
+        made += [
+            Row(
+                f"tuned_32_a_pixel_{side}x{side}_over_default_256.{scene.name}",
+                error,
+                "relMSE",
+                f"default at {DEFAULT_COUNT} VPLs a pixel",
+                scene.default[DEFAULT_COUNT],
+            )
+            for side, error in scene.interleaved.items()
+        ]
+    for name in dict.fromkeys(row.name.split(".")[0] for row in made):
         ratios = [row.ratio for row in made if row.name.startswith(f"{name}.")]
         made.append(Row(name, statistics.median(ratios), "1", "median over scenes; limit", 1.0))
     return made
@@ -101,23 +115,29 @@ def curve_rows(curves: Sequence[SceneCurves]) -> list[Row]:
 
 def measured_curves(name: str, path: Path, progress: Progress) -> SceneCurves:
     """All three curves of one scene."""
-    runtime, views = _prepared(path)
+    prepared = _prepared(path)
+    runtime, views = prepared.runtime, prepared.views
     fitted_views = [view for view in views if view.view.split == "fitted"]
     rotations = table_rotations(ROTATIONS, 0)
     progress(f"{name}: density", 0.0)
     start = ArtistParameters(vpl_count=FITTED_COUNT)
     found = fit_density(runtime, fitted_views, start, rotations=rotations).parameters
     curves: dict[str, Curve] = {"uniform": {}, "default": {}, "fitted": {}}
+    fits: dict[int, ArtistParameters] = {}
     for index, count in enumerate(COUNTS):
         progress(f"{name}: {count} VPLs", index / len(COUNTS))
         drawn = replace(found, vpl_count=count)
         tuned = fit_falloff(rotated_views(runtime, fitted_views, drawn, rotations), drawn)[0]
+        fits[count] = tuned
         for variant, parameters in (
             ("uniform", _UNIFORM),
             ("default", ArtistParameters()),
             ("fitted", tuned),
         ):
             curves[variant][count] = _error(runtime, views, replace(parameters, vpl_count=count))
+    curves["interleaved"] = {
+        side: _interleaved_error(prepared, fits[FITTED_COUNT * side**2], side) for side in INTERLEAVES
+    }
     return SceneCurves(name, **curves, parameters=found)
 
 
@@ -134,7 +154,8 @@ def slope_row(name: str, path: Path, progress: Progress) -> Row:
 
     A gradient is of use where it does nearly always; a coin would do so half of the time.
     """
-    runtime, views = _prepared(path)
+    prepared = _prepared(path)
+    runtime, views = prepared.runtime, prepared.views
     fitted_views = [view for view in views if view.view.split == "fitted"]
     rotations, places = table_rotations(ROTATIONS, 0), np.linspace(0.0, 1.0, SLOPE_STEPS + 1)
     losses = []
@@ -159,6 +180,7 @@ def write_curves(folder: Path, curves: Sequence[SceneCurves]) -> None:
             "uniform": scene.uniform,
             "default": scene.default,
             "fitted": scene.fitted,
+            "interleaved": scene.interleaved,
             "parameters": scene.parameters.as_dict(),
         }
         for scene in curves
@@ -179,15 +201,21 @@ def write_curves(folder: Path, curves: Sequence[SceneCurves]) -> None:
         figure.savefig(temporary, dpi=100)
 
 
-def _prepared(path: Path) -> tuple[Runtime, tuple[CapturedView, ...]]:
+def _prepared(path: Path) -> PreparedScene:
     config = TunedConfig(ArtistParameters(vpl_count=FITTED_COUNT), visibility="maps")
-    prepared = prepare_scene(path, SceneOptions(size=SIZE), config, Stopwatch(), lambda stage, share: None)
-    return prepared.runtime, prepared.views
+    return prepare_scene(path, SceneOptions(size=SIZE), config, Stopwatch(), lambda stage, share: None)
 
 
 def _error(runtime: Runtime, views: Sequence[CapturedView], parameters: ArtistParameters) -> float:
     rotations = table_rotations(ROTATIONS, 0, held_out=True)
     return float(rotation_errors(runtime, views, parameters, rotations).mean())
+
+
+def _interleaved_error(prepared: PreparedScene, parameters: ArtistParameters, side: int) -> float:
+    runtime = prepared.runtime
+    config, options = TunedConfig(parameters, visibility=runtime.visibility), RuntimeOptions(interleave=side)
+    interleaved = Runtime(prepared.scene, config, options, context=runtime.context)
+    return _error(interleaved, prepared.views, parameters)
 
 
 def _main(names: Sequence[str]) -> None:

@@ -24,7 +24,7 @@ def irradiances(runtime: Runtime, view: View, rotations: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
-@pytest.mark.parametrize("density_importance", [0.5, 1.0])
+@pytest.mark.parametrize("density_importance", [pytest.param(0.5, marks=pytest.mark.slow), pytest.param(1.0)])
 def test_the_mean_over_rotations_is_the_same_light(gl_context, light, density_importance):
     """48 rotations of 256 VPLs give the picture of 32,768: mean within 1 %, the middle pixel within 1.5 %.
 

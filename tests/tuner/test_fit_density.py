@@ -26,6 +26,7 @@ def room(gl_context) -> tuple[Runtime, CapturedView]:
     return runtime, converged_view(runtime, "spot")
 
 
+@pytest.mark.slow
 def test_few_vpls_are_better_where_they_were_not_fitted_to(room):
     """On held-out rotations, 24 fitted VPLs beat 24 of the default by a third, and 48 uniform ones."""
     runtime, view = room
@@ -42,6 +43,7 @@ def test_few_vpls_are_better_where_they_were_not_fitted_to(room):
     assert fit.descent.loss == min(trial.loss for trial in fit.trials)
 
 
+@pytest.mark.slow
 def test_the_result_is_never_worse_than_the_falloff_alone(room):
     """The start's own density is among the trials, whatever it is."""
     runtime, view = room

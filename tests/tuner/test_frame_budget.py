@@ -59,7 +59,7 @@ def prepared(gl_context) -> PreparedScene:
     return PreparedScene(colored_room(), runtime, (converged_view(runtime, "spot"),), ())
 
 
-@pytest.mark.parametrize("budget", [12.0, 30.0])
+@pytest.mark.parametrize("budget", [12.0, pytest.param(30.0, marks=pytest.mark.slow)])
 def test_the_frame_fits_the_budget(steady_clock, prepared, budget):
     """Within 10 % below and never more than 5 % above, although the model is 8 % off."""
     fit = FrameBudget(prepared, START, (24, 18)).fit(budget)
@@ -76,6 +76,7 @@ def test_a_budget_below_the_cheapest_frame_is_refused(steady_clock, prepared):
         FrameBudget(prepared, START, (24, 18)).fit(0.5)
 
 
+@pytest.mark.slow
 def test_the_front_is_monotone_and_written(steady_clock, prepared, tmp_path, monkeypatch):
     """More time, less error; each point's config reads back, and table and plot are there."""
     monkeypatch.setattr(frame_budget, "PARETO_POINTS", 3)

@@ -39,7 +39,7 @@ def test_every_source_and_data_file_is_in_the_wheel(wheel):
 
 @pytest.mark.slow
 def test_the_wheel_runs_without_the_checkout(wheel, tmp_path):
-    """Unpacked alone on the path, it draws: shaders and presets are found beside the code."""
+    """Unpacked alone on the path, it draws and reports: shaders, presets, templates lie beside the code."""
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "installed")
     code = (
@@ -47,10 +47,12 @@ def test_the_wheel_runs_without_the_checkout(wheel, tmp_path):
         "import renderer; assert 'installed' in renderer.__file__, renderer.__file__;"
         "from tuner.__main__ import run;"
         f"sys.exit(run(['render', {str(tmp_path / 'installed/configs/scenes/cornell-box.glb')!r},"
-        f" '-o', {str(tmp_path / 'out.png')!r}, '--size', '64x48']))"
+        f" '-o', {str(tmp_path / 'out.png')!r}, '--size', '64x48']) or run(['report', {str(tmp_path)!r}]))"
     )
+    (tmp_path / "metrics.json").write_text('{"scene": "box.glb", "status": "ok"}', encoding="utf-8")
     done = subprocess.run(
         [sys.executable, "-P", "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120
     )
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "out.png").stat().st_size > 0
+    assert "<h1>box</h1>" in (tmp_path / "report.html").read_text(encoding="utf-8")

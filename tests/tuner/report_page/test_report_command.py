@@ -7,8 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from planted_metrics import change_metrics
 
+from renderer.errors import InputError
 from tuner.__main__ import run
 from tuner.report_page.fit_folder import read_fit_folder
 from tuner.report_page.page_template import MAXIMUM_PAGE_BYTES
@@ -109,3 +112,55 @@ def test_many_large_noisy_views_do_not_make_a_page_too_large(fit_copy):
     assert "more views were measured" in page
     assert page.count('class="view"') >= 1
     assert all(f"noisy_{index}" in page for index in range(8))
+
+
+JSON_VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
+    max_leaves=6,
+)
+FIGURES = (
+    "relmse",
+    "energy_ratio",
+    "flip",
+    "noise_floor",
+    "default",
+    "tuned",
+    "ceiling",
+    "fitted",
+    "held_out",
+)
+DOUBTS = ("value", "low", "high", "determined", "trades_with", "intensity", "views", "total", "curve")
+FRAMES = ("milliseconds", "budget_milliseconds", "frame_size", "choice", "vpl_count", "parameters", "config")
+WORDS = ("scene", "status", "sentence", "visibility", "notes", "provenance")
+PARTS = (
+    "parameters",
+    "metrics",
+    "seconds",
+    "loss",
+    "uncertainty",
+    "error_budget",
+    "budget",
+    "per_view",
+    "pareto",
+)
+OBJECTS = st.dictionaries(st.sampled_from(FIGURES + DOUBTS + FRAMES), JSON_VALUES, max_size=4)
+OBJECTS |= st.dictionaries(st.sampled_from(FIGURES + DOUBTS + FRAMES), OBJECTS, max_size=4)
+DOCUMENTS = st.dictionaries(
+    st.sampled_from(WORDS + PARTS), JSON_VALUES | OBJECTS | st.lists(OBJECTS, max_size=3)
+)
+
+
+@given(document=DOCUMENTS)
+@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+def test_whatever_metrics_hold_there_is_a_page_or_one_line(tmp_path_factory, document):
+    folder = tmp_path_factory.getbasetemp() / "any-metrics"
+    folder.mkdir(exist_ok=True)
+    (folder / "metrics.json").write_text(json.dumps(document), encoding="utf-8")
+    try:
+        page = scene_page(read_fit_folder(folder))
+    except InputError as error:
+        assert "\n" not in str(error)
+        assert "metrics.json" in str(error)
+    else:
+        assert page.endswith("</html>")

@@ -14,7 +14,7 @@ from pathlib import Path
 from benchmarks.row import Row
 from benchmarks.scene_library import OWN_SCENES
 
-SCENES = 12
+SCENES = 8
 SECOND_RUN_LIMIT_S = 2.0
 
 

@@ -3,9 +3,12 @@
 import dataclasses
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from renderer.atomic_file import write_text_whole
 
 if TYPE_CHECKING:
     from tuner.fit_scene import FitOptions
@@ -89,3 +92,22 @@ class Job:
         options = document.pop("options")
         size = options.pop("size")
         return cls(**document, options=JobOptions(**options, size=None if size is None else tuple(size)))
+
+
+def write_jobs(path: Path, jobs: Sequence[Job]) -> None:
+    """Write jobs of one batch to a file, what they have in common once."""
+    common = json.loads(jobs[0].to_json())
+    document = {name: common[name] for name in ("folder", "options", "command")}
+    document["jobs"] = [[job.key, job.scene, job.name, job.input_bytes] for job in jobs]
+    write_text_whole(path, json.dumps(document) + "\n")
+
+
+def read_jobs(path: Path) -> list[Job]:
+    """The jobs of a file that `write_jobs` wrote."""
+    document = json.loads(path.read_text(encoding="utf-8"))
+    names = ("key", "scene", "name", "input_bytes")
+    common = {name: document[name] for name in ("folder", "options", "command")}
+    return [
+        Job.from_json(json.dumps({**common, **dict(zip(names, values, strict=True))}))
+        for values in document["jobs"]
+    ]

@@ -1,4 +1,4 @@
-"""The scheduler of a cluster with Slurm, through submitit: an array of tasks, each with a share of scenes.
+"""The scheduler of a cluster with Slurm, through submitit: an array of tasks that share out the scenes.
 
 Nothing is asked of Slurm but to run the tasks: what is done is read from the records. A task that Slurm
 preempts is queued again and goes on; scenes of a task that died go into another array.
@@ -7,6 +7,7 @@ preempts is queued again and goes on; scenes of a task that died go into another
 import sys
 import threading
 import time
+import uuid
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import Any
 
 from renderer.errors import InputError, MachineError
 from tuner.library.attempts import tune_with_retries
-from tuner.library.job import Job
+from tuner.library.job import Job, read_jobs, write_jobs
 from tuner.library.record import Records
 from tuner.library.supervised_process import UNLIMITED_BYTES, Limits, SupervisedProcess
 
@@ -24,7 +25,6 @@ except ModuleNotFoundError as error:
     raise MachineError("--slurm: submitit is not installed; try: pip install 'vpltune[cluster]'") from error
 
 POLL_SECONDS = 2.0
-BUSY_SECONDS = 5.0
 ENDING_SECONDS = 10.0
 """For tasks to end by themselves once all is done."""
 LEAST_MINUTES = 60
@@ -37,34 +37,39 @@ Event = dict[str, Any]
 
 
 class TuneShare(submitit.helpers.Checkpointable):
-    """What a task runs: its share of the scenes, one after another.
+    """What a task runs: its share of the scenes one after another, then what others have not begun.
 
     Called again after it was interrupted, it passes over what is done.
     """
 
-    def __init__(self, jobs: list[str], threads: int, limits: Limits) -> None:
-        self._jobs = jobs
+    def __init__(self, listing: Path, first: int, step: int, threads: int, limits: Limits) -> None:
+        self._listing = listing
+        self._first = first
+        self._step = step
         self._threads = threads
         self._limits = limits
 
     def __call__(self) -> None:
+        jobs = read_jobs(self._listing)
         process = SupervisedProcess(self._threads, threading.Event())
-        left = [Job.from_json(job) for job in self._jobs]
         try:
-            while left:
-                busy = [job for job in left if self._tune(process, job) is None]
-                if len(busy) == len(left):
-                    time.sleep(BUSY_SECONDS)  # another run has all of them
-                left = busy
+            for job in jobs[self._first :: self._step]:
+                self._tune(process, job)
+            known = Records(Path(jobs[0].folder)).known_keys()
+            # From its own place on, so that tasks that are done do not all look at the same scene; one that
+            # another task or run has is left to it.
+            for job in jobs[self._first :] + jobs[: self._first]:
+                if job.key not in known:
+                    self._tune(process, job)
         finally:
             process.close()
 
-    def _tune(self, process: SupervisedProcess, job: Job) -> Any:
+    def _tune(self, process: SupervisedProcess, job: Job) -> None:
         def say(event: Event) -> None:
             if event["event"] == "attempt_failed":  # into the task's own log
                 print(f"{event['name']}: attempt {event['attempt']}: {event['reason']}", file=sys.stderr)
 
-        return tune_with_retries(process, job, self._limits, say)
+        tune_with_retries(process, job, self._limits, say)
 
 
 def tune_on_slurm(
@@ -99,11 +104,12 @@ def _one_array(
     limits: Limits,
 ) -> Iterator[Event]:
     # Dealt like cards, largest first: shares come out about even.
-    shares = [list(left.values())[first::workers] for first in range(min(workers, len(left)))]
+    jobs = list(left.values())
+    count = min(workers, len(jobs))
+    listing = Path(jobs[0].folder) / "slurm" / f"jobs-{uuid.uuid4().hex[:8]}.json"
+    write_jobs(listing, jobs)
     with executor.batch():
-        tasks = [
-            executor.submit(TuneShare([job.to_json() for job in share], threads, limits)) for share in shares
-        ]
+        tasks = [executor.submit(TuneShare(listing, first, count, threads, limits)) for first in range(count)]
     yield {"event": "workers", "count": len(tasks)}
     try:
         running = True

@@ -7,7 +7,7 @@ import pytest
 
 from renderer.errors import InputError, MachineError
 from tuner.library.claim import claimed
-from tuner.library.job import Job
+from tuner.library.job import Job, read_jobs, write_jobs
 from tuner.library.record import Records
 from tuner.library.tune_one import set_aside, tune_one
 
@@ -103,3 +103,9 @@ def test_a_job_travels_as_text(make_job):
     job = make_job("name with spaces/and é.glb".replace("/", "-"))
     assert Job.from_json(job.to_json()) == job
     assert job.output_name == f"scenes/name_with_spaces-and_.glb-{job.key[:12]}".replace(".glb-", "-")
+
+
+def test_many_jobs_travel_in_a_file(make_job, tmp_path):
+    jobs = [make_job(f"{index}.glb", size=index) for index in range(3)]
+    write_jobs(tmp_path / "jobs.json", jobs)
+    assert read_jobs(tmp_path / "jobs.json") == jobs

@@ -30,7 +30,7 @@ class RuntimeOptions:
     point_table: PointTable = "r2"
     """From which VPLs are placed: the R2 sequence, or the study's Poisson discs, to compare with."""
 
-    visibility_map_size: int = 16
+    visibility_map_size: int = 24
     """Texels along the side of a VPL's visibility map, in [4, 64], where the config asks for maps."""
 
     rsm_filtering: RsmFiltering = 5

@@ -28,9 +28,6 @@ uniform int vpl_count;
 const int SUBSETS = INTERLEAVE * INTERLEAVE;
 
 shared VirtualPointLight batch[64];
-#if VISIBILITY_MAP_SIZE > 0
-shared mat3 batch_frame[64];
-#endif
 
 ivec2 own_pixel(int subset) {
     if (LISTED_PIXELS != 0) {
@@ -58,9 +55,6 @@ void main() {
         int lane = int(gl_LocalInvocationIndex);
         if (start + lane < end) {
             batch[lane] = virtual_point_lights[start + lane];
-#if VISIBILITY_MAP_SIZE > 0
-            batch_frame[lane] = hemisphere_frame(batch[lane].normal_area.xyz);
-#endif
         }
         barrier();
         int count = min(64, end - start);
@@ -71,7 +65,7 @@ void main() {
             // About half of all pairs face away from each other, and need no look at the map.
             if (any(greaterThan(unoccluded, vec3(0.0)))) {
                 unoccluded *= vpl_visibility(
-                    receiver.position_world, receiver.normal_world, batch[i], batch_frame[i],
+                    receiver.position_world, receiver.normal_world, batch[i],
                     (start + i) * (VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE), scene_length, visibility);
             }
 #endif

@@ -23,6 +23,7 @@ from tuner.fit_budget import BudgetOptions, fit_to_budget
 from tuner.fit_density import density_document, fit_density
 from tuner.fit_falloff import fit_views
 from tuner.fit_status import Descent
+from tuner.fit_visibility import fit_visibility
 from tuner.prepare_scene import PreparedScene, Progress, SceneOptions, Stopwatch, prepare_scene
 from tuner.reference.content_key import scene_digest
 from tuner.search_space import SearchSpace
@@ -185,6 +186,8 @@ def _fitted(
         )
         found = {"density": document}
     else:
+        if options.start.visibility == "maps":
+            start, _ = fit_visibility(views, start, seed=seed)
         ready = fit_views(views, start, seed=seed)
         tuned, descent, known = fit_with_intervals(ready, start, progress=report)
         return tuned, descent, known, prepared.views, {}

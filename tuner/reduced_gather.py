@@ -40,16 +40,17 @@ class ReducedGather:
 
 def reduce_gather(binned: BinnedGather, target: Target) -> ReducedGather:
     """The small problem of one view; done once for each placement of the VPLs."""
-    gram, offset = _gram(binned.irradiance, target)
+    return ReducedGather(*reduce_columns(binned.irradiance, target), binned.distance, binned.footprint)
+
+
+def reduce_columns(
+    irradiance: Float[Array, "receivers 3 nodes"], target: Target
+) -> tuple[Float[Array, "rows nodes"], Float[Array, "rows"], Float[Array, ""]]:
+    """Factor, target and offset of the least-squares problem for any picture `irradiance` · x."""
+    gram, offset = _gram(irradiance, target)
     values, vectors = np.linalg.eigh(np.asarray(gram, np.float64).sum(axis=0))
     factor = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
-    return ReducedGather(
-        jnp.asarray(factor[:, :-1], jnp.float32),
-        jnp.asarray(factor[:, -1], jnp.float32),
-        offset,
-        binned.distance,
-        binned.footprint,
-    )
+    return jnp.asarray(factor[:, :-1], jnp.float32), jnp.asarray(factor[:, -1], jnp.float32), offset
 
 
 def reduced_picture(reduced: ReducedGather, parameters: FalloffParameters) -> Float[Array, "rows"]:

@@ -8,12 +8,16 @@ from jaxtyping import Array, Float
 
 from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters, ParameterSpec
 
+VISIBILITY_SPECS = tuple(spec for spec in ARTIST_PARAMETERS if spec.name.startswith("visibility_"))
+"""Those of visibility maps, fitted in turns with the others (`tuner.fit_visibility`)."""
+FALLOFF_SPECS = tuple(spec for spec in ARTIST_PARAMETERS if spec.fitted and spec not in VISIBILITY_SPECS)
+
 
 @dataclass(frozen=True)
 class SearchSpace:
     """Maps the unit cube to parameter values: each axis linear or logarithmic, as the table says."""
 
-    specs: tuple[ParameterSpec, ...] = tuple(spec for spec in ARTIST_PARAMETERS if spec.fitted)
+    specs: tuple[ParameterSpec, ...] = FALLOFF_SPECS
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -13,17 +13,15 @@ from tuner.virtual_point_lights import Receivers, VirtualPointLights
 
 VISIBILITY_LIFT = 0.01
 """Footprints by which a map's origin is lifted off the VPL's surface; twin of the shader's constant."""
-VISIBILITY_NEAREST = 0.8
-"""Share of the receiver's distance from which a ray says something of the receiver; twin of the shader's."""
 CHUNK = 128
-"""Receivers at once: 128 × 1,024 pairs with four texels each are 2 MiB an array."""
+"""Receivers at once: 128 × 1,024 pairs are half a MiB an array, nine with vectors."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class VisibilityParameters:
-    """bias: of the distance, by how much a blocker must overlap both planes to block all. softness: of a
-    texel, over which light fades in across a shadow's edge."""
+    """bias: of the distance, how far two surfaces may overlap before one shades the other. softness: of the
+    distance, over which light then fades out."""
 
     bias: Float[Array, ""]
     softness: Float[Array, ""]
@@ -92,11 +90,24 @@ def map_visibility(
 def vpl_visibility(
     receivers: Receivers, vpls: VirtualPointLights, texels: MapTexels, parameters: VisibilityParameters
 ) -> Float[Array, "receivers vpls"]:
-    """Share of each VPL's light that reaches each receiver, in [0, 1]. Twin: `vpl_visibility` in GLSL.
+    """Share of each VPL's light that reaches each receiver, in [0, 1]. Twin: `vpl_visibility` in GLSL."""
+    return seen_share(surface_overlap(receivers, vpls, texels), parameters)
 
-    What a texel's ray met blocks if it stands before the receiver's tangent plane (receiver plane depth bias,
-    Isidoro 2006) and the receiver behind its own. The blend of the four texels around its direction is
-    cut at one half (Green 2007).
+
+def seen_share(overlap: Float[Array, "*shape"], parameters: VisibilityParameters) -> Float[Array, "*shape"]:
+    """Share of the light that passes a surface which overlaps the receiver by so much."""
+    return 1.0 - jnp.clip((overlap - parameters.bias) / parameters.softness, 0.0, 1.0)
+
+
+@jax.jit
+def surface_overlap(
+    receivers: Receivers, vpls: VirtualPointLights, texels: MapTexels
+) -> Float[Array, "receivers vpls"]:
+    """By how much, of the distance, what a VPL sees in a receiver's direction overlaps the receiver.
+
+    What the ray nearest to the receiver's direction met stands so far before the receiver's tangent plane
+    (receiver plane depth bias, Isidoro 2006), and the receiver so far behind its own: the lesser of the two.
+    Negative where nothing is between them, and -1 where no light passes anyway.
 
     Args:
         receivers, vpls: lengths in units of L.
@@ -116,29 +127,14 @@ def vpl_visibility(
         asked = (to_receiver[..., 2] > 0.0) & (plane < 0.0)
         # Where not asked, any finite direction serves.
         to_receiver = jnp.where(asked[..., None], to_receiver, jnp.array([0.0, 0.0, 1.0]))
-        place = (hemi_octahedral_encode(to_receiver) * 0.5 + 0.5) * size - 0.5
-        corner = jnp.floor(place)
-        blend = place - corner
-        inverse_squared = 1.0 / (to_receiver**2).sum(-1)
-        sharpness = jnp.sqrt(inverse_squared) / parameters.bias
-        visible = weights = 0.0
-        for i in range(4):
-            step = jnp.array([i & 1, i >> 1])
-            texel = jnp.clip(corner.astype(jnp.int32) + step, 0, size - 1)
-            index = first + texel[..., 1] * size + texel[..., 0]
-            end, met_normal = texels.end[index], texels.normal[index]
-            before = (end * normal).sum(-1) - plane
-            behind = ((end - to_receiver) * met_normal).sum(-1)
-            blocked = jnp.clip(jnp.minimum(before, behind) * sharpness, 0.0, 1.0)
-            reach = (end * to_receiver).sum(-1) * inverse_squared
-            known = jnp.clip((reach - VISIBILITY_NEAREST) / (1.0 - VISIBILITY_NEAREST), 0.0, 1.0)
-            share = jnp.prod(jnp.where(step == 1, blend, 1.0 - blend), axis=-1)
-            weight = share * jnp.maximum(blocked, known)
-            visible += weight * (1.0 - blocked)
-            weights += weight
-        seen = jnp.where(weights > 1e-4, visible / jnp.maximum(weights, 1e-4), 1.0)
-        seen = jnp.clip((seen - 0.5) / parameters.softness + 0.5, 0.0, 1.0)
-        return jnp.where(asked, seen, 1.0)
+        place = (hemi_octahedral_encode(to_receiver) * 0.5 + 0.5) * size
+        texel = jnp.minimum(place.astype(jnp.int32), size - 1)
+        index = first + texel[..., 1] * size + texel[..., 0]
+        end, met_normal = texels.end[index], texels.normal[index]
+        before = (end * normal).sum(-1) - plane
+        behind = ((end - to_receiver) * met_normal).sum(-1)
+        overlap = jnp.minimum(before, behind) / jnp.linalg.norm(to_receiver, axis=-1)
+        return jnp.where(asked, overlap, -1.0)
 
     count = receivers.position.shape[0]
     padding = ((0, -count % CHUNK), (0, 0))

@@ -52,9 +52,10 @@ def test_defaults_are_those_of_the_table():
     assert ArtistParameters().as_dict() == {spec.name: spec.default for spec in ARTIST_PARAMETERS}
 
 
-def test_the_tuner_fits_intensity_and_both_falloffs():
+def test_the_tuner_fits_intensity_both_falloffs_and_what_maps_have():
     fitted = {spec.name for spec in ARTIST_PARAMETERS if spec.fitted}
-    assert fitted == {"intensity", "falloff_footprint", "falloff_transmittance"}
+    falloff = {"intensity", "falloff_footprint", "falloff_transmittance"}
+    assert fitted == falloff | {"visibility_bias", "visibility_softness"}
 
 
 @pytest.mark.parametrize("spec", ARTIST_PARAMETERS, ids=lambda spec: spec.name)

@@ -1,0 +1,171 @@
+"""Fits bias and softness of visibility maps: they act on a pair of receiver and VPL through one number.
+
+That number is the overlap of `tuner.vpl_visibility.surface_overlap`. With the falloff held, each receiver's
+VPLs are summed once over a grid of overlaps; irradiance is then a matrix product of these sums with the share
+that is seen at each overlap, and a step costs next to nothing (`tuner.reduced_gather`). Falloff and
+visibility are fitted in turns, on a part of each view's pixels.
+"""
+
+from dataclasses import dataclass, replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from renderer.artist_parameters import ArtistParameters
+from tuner.captured_view import CapturedView
+from tuner.descent import descend
+from tuner.fit_falloff import fit_to
+from tuner.fit_status import Descent
+from tuner.fit_views import fit_view
+from tuner.losses.relative_squared_error import target_of
+from tuner.reduced_gather import reduce_columns
+from tuner.search_space import VISIBILITY_SPECS, SearchSpace
+from tuner.virtual_point_lights import Receivers, VirtualPointLights, gather_inputs
+from tuner.vpl_gather import FalloffParameters, pair_geometry
+from tuner.vpl_visibility import VisibilityParameters, map_texels, seen_share, surface_overlap
+
+RECEIVERS_PER_VIEW = 1024
+"""Pixels of each view: a quarter of those that the falloff is fitted to, which two parameters can spare."""
+TURNS = 2
+NODES = 48
+"""Of the grid, geometric in the overlap: each a fifth above the one before."""
+_LEAST = VISIBILITY_SPECS[0].low
+_MOST = sum(spec.high for spec in VISIBILITY_SPECS)
+
+SPACE = SearchSpace(VISIBILITY_SPECS)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class ReducedVisibility:
+    """One view with its falloff held. |factor · (1, seen at the nodes) − target|² + offset is its loss."""
+
+    factor: Float[Array, "rows columns"]
+    target: Float[Array, "rows"]
+    offset: Float[Array, ""]
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    receivers: Receivers
+    vpls: VirtualPointLights
+    overlap: Float[Array, "receivers vpls"]
+    halves: tuple[np.ndarray, np.ndarray]
+    pixels: np.ndarray
+    size: tuple[int, int]
+
+
+def fit_visibility(
+    views: tuple[CapturedView, ...], start: ArtistParameters, *, seed: int = 0
+) -> tuple[ArtistParameters, Descent | None]:
+    """`start` with the bias and softness that bring the views closest to their references.
+
+    Args:
+        views: what to fit to, captured with visibility maps.
+        start: where to begin; what else it holds is kept, though the falloff is refitted on the way.
+        seed: of the choice of pixels.
+
+    Returns:
+        The parameters, and the last turn's descent; None where nothing is lit.
+    """
+    chosen = [_view_of(view, seed + index) for index, view in enumerate(views)]
+    current, descent = start, None
+    for _ in range(TURNS):
+        ready = tuple(
+            fit_view(
+                view.receivers,
+                view.vpls,
+                seen_share(view.overlap, VisibilityParameters.of(current)),
+                *view.halves,
+                view.pixels,
+                view.size,
+            )
+            for view in chosen
+        )
+        current, falloff = fit_to(ready, current)
+        if falloff.status.failed:
+            return start, None
+        current, descent = fit_visibility_to(tuple(_reduced(view, current) for view in chosen), current)
+    found = {spec.name: getattr(current, spec.name) for spec in VISIBILITY_SPECS}
+    return replace(start, **found), descent
+
+
+def fit_visibility_to(
+    views: tuple[ReducedVisibility, ...], start: ArtistParameters
+) -> tuple[ArtistParameters, Descent]:
+    """Bias and softness for views whose falloff is held."""
+    offset = float(sum(view.offset for view in views)) / len(views)
+    descent = descend(residuals, views, SPACE.point(start), offset=offset)
+    return SPACE.parameters(descent.point, start), descent
+
+
+def residuals(
+    point: Float[Array, "parameters"], views: tuple[ReducedVisibility, ...]
+) -> Float[Array, "rows"]:
+    """Of all views, each counting the same, at a point of the unit cube."""
+    values = SPACE.values(point)
+    parameters = VisibilityParameters(values["visibility_bias"], values["visibility_softness"])
+    seen = jnp.concatenate([jnp.ones(1), seen_share(jnp.asarray(overlap_nodes()), parameters)])
+    pictures = [jnp.matmul(view.factor, seen, precision="highest") - view.target for view in views]
+    return jnp.concatenate(pictures) / np.sqrt(len(views))
+
+
+def overlap_nodes() -> Float[np.ndarray, "nodes"]:
+    """The grid: below its first node all is seen, beyond its last nothing, whatever the parameters."""
+    return np.geomspace(_LEAST, _MOST, NODES).astype(np.float32)
+
+
+def reduce_visibility(
+    receivers: Receivers,
+    vpls: VirtualPointLights,
+    overlap: Float[Array, "receivers vpls"],
+    halves: tuple[np.ndarray, np.ndarray],
+    falloff: FalloffParameters,
+) -> ReducedVisibility:
+    """The small problem of one view for the falloff given; `halves` of the reference at the receivers."""
+    sums = _sums(receivers, vpls, overlap, falloff)
+    return ReducedVisibility(*reduce_columns(sums, target_of(*halves)))
+
+
+def _view_of(view: CapturedView, seed: int) -> _View:
+    maps = view.captured.visibility_maps
+    assert maps is not None, "the views were captured without visibility maps"
+    chosen = view.fitted_pixels(RECEIVERS_PER_VIEW, seed)
+    receivers, vpls = gather_inputs(view.captured, chosen)
+    pixels = np.flatnonzero(view.captured.valid.ravel())[chosen]
+    half_a, half_b = (
+        half.reshape(-1, 3)[pixels] for half in (view.reference.irradiance_a, view.reference.irradiance_b)
+    )
+    overlap = surface_overlap(receivers, vpls, map_texels(maps))
+    return _View(receivers, vpls, overlap, (half_a, half_b), pixels, view.view.size)
+
+
+def _reduced(view: _View, parameters: ArtistParameters) -> ReducedVisibility:
+    falloff = FalloffParameters.of(parameters)
+    return reduce_visibility(view.receivers, view.vpls, view.overlap, view.halves, falloff)
+
+
+@jax.jit
+def _sums(
+    receivers: Receivers,
+    vpls: VirtualPointLights,
+    overlap: Float[Array, "receivers vpls"],
+    falloff: FalloffParameters,
+) -> Float[Array, "receivers 3 columns"]:
+    """What is always seen, then what is shared out between the nodes, linearly in the logarithm."""
+    squared, cosines = pair_geometry(receivers, vpls)
+    footprint = falloff.falloff_footprint * vpls.footprint
+    transmittance = jnp.exp(-falloff.falloff_transmittance * jnp.sqrt(squared))
+    form = falloff.intensity / jnp.pi * cosines / (squared + footprint**2) * transmittance
+    step = np.log(_MOST / _LEAST) / (NODES - 1)
+    place = jnp.log(jnp.maximum(overlap, _LEAST) / _LEAST) / step
+
+    def column(index: Array) -> Float[Array, "receivers 3"]:
+        share = jnp.maximum(1.0 - jnp.abs(place - index), 0.0) * (overlap > _LEAST)
+        return jnp.matmul(form * share, vpls.flux, precision="highest")
+
+    always = jnp.matmul(form * (overlap <= _LEAST), vpls.flux, precision="highest")
+    nodes = jax.lax.map(column, jnp.arange(NODES, dtype=jnp.float32))
+    return jnp.concatenate([always[None], nodes]).transpose(1, 2, 0)

@@ -29,12 +29,12 @@ COUNTS = (32, 256)
 FRAMES = 5
 """Timed at each, of which the median counts."""
 INTERLEAVES = (1, 2, 4)
-MAP_SIZES = (8, 16)
+MAP_SIZES = (8, 16, 24)
 RSM_DIVISORS = (1, 2, 4)
 
 _RSM_PASSES = frozenset({"reflective_shadow_map", "vpl_importance", "virtual_point_lights"})
 _GATHER_PASSES = frozenset({"vpl_gather", "interleaved_filter"})
-_FORMAT = 1
+_FORMAT = 2
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class FrameChoice:
     """What a program chooses to fit a frame into its time, beside the number of VPLs."""
 
     interleave: int = 1
-    visibility_map_size: int = 16
+    visibility_map_size: int = RuntimeOptions().visibility_map_size
     rsm_resolution: int = RSM_RESOLUTION
     """Of a face: shadows of direct light come from the same map, and grow coarser with it."""
 

@@ -59,7 +59,7 @@ def auto_runtime(clip: CarriedLight, prior: AutoPrior | None = None, **keywords:
     config = read_config("auto")
     parameters = ArtistParameters(**{**config.parameters.as_dict(), "vpl_count": VPL_COUNT})
     config = TunedConfig(parameters, visibility="maps", auto=config.auto if prior is None else prior)
-    options = RuntimeOptions(adaptation_frames=ADAPTATION_FRAMES)
+    options = RuntimeOptions(interleave=4, adaptation_frames=ADAPTATION_FRAMES)
     return Runtime(clip.scene, config, options, **keywords)
 
 

@@ -1,28 +1,34 @@
 """What a prior is trained on: scenes with references, each captured at several VPL counts, as loss tables.
 
-A scene's part is made once and kept in the user's cache folder, under all that it depends on: the scene, its
-views, and the source of what draws and measures it.
+A scene's part is made once and kept in the user's cache folder, under all that it depends on.
 """
 
 import hashlib
 import io
 import json
 from dataclasses import dataclass, replace
-from importlib import resources
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float32, Int32
 
-from renderer.artist_parameters import ArtistParameters
+from renderer.artist_parameters import ArtistParameters, parameter_spec
 from renderer.atomic_file import written_whole
+from renderer.auto_prior import AUTO_PARAMETERS
 from renderer.runtime import Runtime
 from renderer.scene import Scene
+from renderer.scene_statistics import STATISTIC_NAMES
 from renderer.tuned_config import TunedConfig
 from renderer.view_placement import views_for_scene
 from renderer.views import View, views_to_json
 from tuner.captured_view import CapturedView
-from tuner.loss_table import LossTable, loss_table
+from tuner.loss_table import (
+    BIAS_PLACES,
+    FOOTPRINT_PLACES,
+    RECEIVERS,
+    SOFTNESS_PLACES,
+    LossTable,
+    loss_table,
+)
 from tuner.reference import ReferenceView, reference_views
 from tuner.reference.cache import cache_folder
 from tuner.reference.content_key import scene_digest
@@ -37,25 +43,8 @@ ROTATIONS = {16: ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1)), 64: ((0.0, 0.0), (0.3, 0.
 """VPL counts, and the rotations of the point table that each is captured with: few VPLs are noisy, and one
 placement's noise is not to be learnt."""
 
-_SOURCES = (
-    "shaders/**/*.comp",
-    "shaders/**/*.frag",
-    "shaders/**/*.glsl",
-    "shaders/**/*.vert",
-    "renderer/passes/*.py",
-    "renderer/artist_parameters.py",
-    "renderer/frame.py",
-    "renderer/light_faces.py",
-    "renderer/point_table.py",
-    "renderer/ray_hierarchy.py",
-    "renderer/scene_statistics.py",
-    "tuner/binned_gather.py",
-    "tuner/loss_table.py",
-    "tuner/losses/*.py",
-    "tuner/prior_library.py",
-    "tuner/vpl_visibility.py",
-)
-"""All that may draw or measure otherwise tomorrow."""
+CAPTURE_VERSION = 1
+"""Raise whenever the same scene gives other statistics or another loss: old entries are then passed over."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,20 +120,14 @@ def _captured(scene: Scene, views: tuple[View, ...], references: tuple[Reference
 
 
 def _key(scene: Scene, views: tuple[View, ...]) -> str:
-    content = [
-        scene_digest(scene),
-        views_to_json(scene.name, views),
-        list(ROTATIONS.items()),
-        _source_digest(),
-    ]
-    content += [NOISE_TARGET, MAX_SAMPLES, RSM_RESOLUTION]
+    axes = [parameter_spec(name) for name in AUTO_PARAMETERS]
+    content = {
+        "scene": scene_digest(scene),
+        "views": views_to_json(scene.name, views),
+        "captures": [CAPTURE_VERSION, list(ROTATIONS.items()), NOISE_TARGET, MAX_SAMPLES, RSM_RESOLUTION],
+        "statistics": STATISTIC_NAMES,
+        "parameters": ArtistParameters().as_dict(),
+        "axes": [[spec.low, spec.high, spec.scale] for spec in axes],
+        "nodes": [FOOTPRINT_PLACES, BIAS_PLACES, SOFTNESS_PLACES, RECEIVERS],
+    }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-
-
-def _source_digest() -> str:
-    digest = hashlib.sha256()
-    for pattern in _SOURCES:
-        package, _, within = pattern.partition("/")
-        for path in sorted(Path(str(resources.files(package))).glob(within)):
-            digest.update(path.name.encode() + path.read_bytes())
-    return digest.hexdigest()

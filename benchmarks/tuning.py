@@ -43,10 +43,10 @@ SIZE = (64, 48)
 VPLS = 256
 FRAME_CAP = 300
 """Frames that a search over the runtime may draw in a scene."""
-SURROGATE_CAP = 500
+SURROGATE_CAP = 300
 """Evaluations of a search over the surrogate."""
 OWN_RUNS = 5
-SECONDS_CAP = 60.0
+SECONDS_CAP = 20.0
 WITHIN = 0.01
 SCENES = (
     "babylon-marble-tower",

@@ -15,7 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from tuner.fit_status import Descent, FitStatus
 
@@ -27,6 +27,7 @@ SETTLED = 1e-6
 LONGEST_STEP = 0.3
 """Of the cube's side, along any axis."""
 FIRST_DAMPING = 1e-2
+PROFILE_STEPS = 12
 _LEAST_DAMPING, _MOST_DAMPING = 1e-7, 1e7
 _NARROWING, _WIDENING = 0.1, 10.0
 
@@ -87,6 +88,36 @@ def descend(
     return Descent(np.asarray(state.point), float(losses[-1]), float(losses[0]), losses, status)
 
 
+def profile(
+    residuals: Residuals,
+    data: Data,
+    start: Float[np.ndarray, "parameters"],
+    axis: int,
+    places: Float[np.ndarray, "places"],
+    free: Bool[np.ndarray, "parameters"],
+) -> Float[np.ndarray, "places"]:
+    """The least Σ residuals² with one parameter held at each of `places`, and those that are `free` at their
+    best; the rest stays at `start`."""
+    free = free & (np.arange(len(start)) != axis)
+    squares = _profile(
+        residuals, data, jnp.asarray(start, jnp.float32), axis, jnp.asarray(places, jnp.float32), free
+    )
+    return np.asarray(squares, np.float64)
+
+
+@partial(jax.jit, static_argnums=0)
+def _profile(residuals: Residuals, data: Any, start: Array, axis: Array, places: Array, free: Array) -> Array:
+    held = jnp.arange(start.shape[0]) == axis
+
+    def least(place: Array) -> Array:
+        point = jnp.where(held, place, start)
+        state = _State(point, _linearise(residuals, point, data), jnp.float32(FIRST_DAMPING))
+        state, _ = jax.lax.scan(partial(_improve, residuals, data, free), state, None, length=PROFILE_STEPS)
+        return state.at_point.squares
+
+    return jax.vmap(least)(places)
+
+
 def _linearise(residuals: Residuals, point: Array, data: Any) -> _Linearised:
     """Forward mode: a handful of parameters, and nothing of the residuals' making is kept."""
 
@@ -104,9 +135,11 @@ def _first(residuals: Residuals, point: Array, data: Any) -> _Linearised:
     return _linearise(residuals, point, data)
 
 
-def _step(at: _Linearised, point: Array, damping: Array) -> Array:
+def _step(at: _Linearised, point: Array, damping: Array, free: Array | None = None) -> Array:
     """The damped Gauss-Newton step over the free axes, no longer than LONGEST_STEP."""
     held = ((point <= 0.0) & (at.slope > 0.0)) | ((point >= 1.0) & (at.slope < 0.0))
+    if free is not None:
+        held |= ~free
     slope = jnp.where(held, 0.0, at.slope)
     curvature = jnp.where(held[:, None] | held[None, :], 0.0, at.curvature)
     values, vectors = jnp.linalg.eigh(curvature)
@@ -116,19 +149,23 @@ def _step(at: _Linearised, point: Array, damping: Array) -> Array:
     return step * jnp.minimum(1.0, LONGEST_STEP / jnp.maximum(jnp.abs(step).max(), LONGEST_STEP))
 
 
+def _improve(
+    residuals: Residuals, data: Any, free: Array | None, state: _State, _: None
+) -> tuple[_State, Array]:
+    """One step of the scan: taken if it lowers the sum of squares."""
+    point = state.point + _step(state.at_point, state.point, state.damping, free)
+    point = optax.projections.projection_box(point, 0.0, 1.0)
+    tried = _linearise(residuals, point, data)
+    # A comparison with NaN is false; an infinite slope beside a finite value would be one step later.
+    finite = jnp.isfinite(tried.slope).all() & jnp.isfinite(tried.curvature).all()
+    better = (tried.squares < state.at_point.squares) & finite
+    damping = jnp.clip(
+        state.damping * jnp.where(better, _NARROWING, _WIDENING), _LEAST_DAMPING, _MOST_DAMPING
+    )
+    kept = jax.tree.map(partial(jnp.where, better), (point, tried), (state.point, state.at_point))
+    return _State(*kept, damping), kept[1].squares
+
+
 @partial(jax.jit, static_argnums=0)
 def _block(residuals: Residuals, state: _State, data: Any) -> tuple[_State, Array]:
-    def step(state: _State, _: None) -> tuple[_State, Array]:
-        point = state.point + _step(state.at_point, state.point, state.damping)
-        point = optax.projections.projection_box(point, 0.0, 1.0)
-        tried = _linearise(residuals, point, data)
-        # A comparison with NaN is false; an infinite slope beside a finite value would be one step later.
-        finite = jnp.isfinite(tried.slope).all() & jnp.isfinite(tried.curvature).all()
-        better = (tried.squares < state.at_point.squares) & finite
-        damping = jnp.clip(
-            state.damping * jnp.where(better, _NARROWING, _WIDENING), _LEAST_DAMPING, _MOST_DAMPING
-        )
-        kept = jax.tree.map(partial(jnp.where, better), (point, tried), (state.point, state.at_point))
-        return _State(*kept, damping), kept[1].squares
-
-    return jax.lax.scan(step, state, None, length=BLOCK)
+    return jax.lax.scan(partial(_improve, residuals, data, None), state, None, length=BLOCK)

@@ -145,6 +145,17 @@ def _squares(falloff: FalloffParameters, data: Data) -> Float[Array, ""]:
 
 
 @lru_cache
+def all_residuals(space: SearchSpace) -> Residuals:
+    """Residuals over all of `space`, k like the others; what they are given is the reduced views."""
+
+    def residuals(point: Float[Array, "parameters"], data: Data) -> Float[Array, "rows"]:
+        pictures, targets = _pictures_and_targets(FalloffParameters(**space.values(point)), data)
+        return (pictures - targets) / np.sqrt(len(data))
+
+    return residuals
+
+
+@lru_cache
 def _residuals(space: SearchSpace) -> Residuals:
     # One function object for each space: the compiled fit is found again by it.
     def residuals(

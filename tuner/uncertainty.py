@@ -8,8 +8,10 @@ these moves,
 
     C = (B − 1)/B Σ_b m_b m_bᵀ
 
-which holds noise and misfit and does not shrink where few tiles tell all. The interval is Student's, with as
-many degrees of freedom as tiles tell about the parameter (Carter, Schnepel and Steigerwald 2017) less one.
+which holds noise and misfit and does not shrink where few tiles tell all. The interval of a parameter is
+where its profile, the least sum of squares with all others at their best, rises by less than t² C/H⁻¹: for a
+parabola that is Student's interval, and where the loss flattens out, as towards small α, it goes on. t has as
+many degrees of freedom as tiles tell about the parameter (Carter, Schnepel and Steigerwald 2017), less one.
 """
 
 from collections.abc import Callable
@@ -24,7 +26,8 @@ from scipy.special import stdtrit
 
 from renderer.artist_parameters import ArtistParameters
 from tuner.binned_gather import gather_binned
-from tuner.fit_falloff import fit_to
+from tuner.descent import profile
+from tuner.fit_falloff import all_residuals, fit_to
 from tuner.fit_status import Descent
 from tuner.fit_views import TILES, FitView
 from tuner.search_space import SearchSpace
@@ -35,6 +38,8 @@ OPEN_SHARE = 1.0 / 3.0
 """Of a parameter's range, on its own scale: an interval that is wider says nothing."""
 PRIOR_COST = 0.01
 """Of the sum of squares, which a parameter may cost that goes back to the prior."""
+REACH = np.geomspace(1e-3, 1.0, 16)
+"""Of the cube's side: how far from the optimum a profile is asked, on either side."""
 TRADING = 0.8
 """Correlation from which on two parameters are said to trade with each other."""
 
@@ -94,7 +99,6 @@ def intervals(
     """Intervals of the parameters in `names` at the optimum `tuned`, all others taken to be known."""
     space = SearchSpace()
     chosen = [index for index, name in enumerate(space.names) if name in names]
-    point = space.point(tuned)[chosen]
     slope, curvature = _tiles(views, space, jnp.asarray(space.point(tuned), jnp.float32))
     slope, curvature = slope[:, chosen], curvature[:, chosen][:, :, chosen]
     # In units in which every parameter has curvature 1: one that hardly shows is not one that is known.
@@ -102,19 +106,19 @@ def intervals(
     slope, curvature = slope * unit, curvature * np.outer(unit, unit)
     total = curvature.sum(axis=0)
     moves = np.stack([_inverse(total - own) @ g for own, g in zip(curvature, slope, strict=True)]) * unit
-    # A tile without which nothing is known moves the optimum anywhere in the cube, but not out of it.
-    moves = np.clip(moves, -1.0, 1.0)
-    covariance = (len(moves) - 1) / len(moves) * moves.T @ moves
+    spread = (len(moves) - 1) / len(moves) * (moves**2).sum(axis=0)
+    inverse = _inverse(total) * np.outer(unit, unit)
     told = np.einsum("ij,bjk,ki->bi", _inverse(total), curvature, _inverse(total))
     witnesses = told.sum(axis=0) ** 2 / np.maximum((told**2).sum(axis=0), 1e-30)
-    half = np.sqrt(np.diag(covariance)) * stdtrit(np.maximum(witnesses - 1.0, 1.0), (1.0 + CONFIDENCE) / 2.0)
-    # Where the optimum lies in a wall of the cube, what the views ask for lies beyond it.
-    center = point - unit * (_inverse(total) @ slope.sum(axis=0))
-    low, high = (np.clip(center + sign * half, 0.0, 1.0) for sign in (-1.0, 1.0))
-    low, high = np.minimum(low, point), np.maximum(high, point)
+    student = stdtrit(np.maximum(witnesses - 1.0, 1.0), (1.0 + CONFIDENCE) / 2.0)
+    allowed = student**2 * spread / np.diag(inverse)
+    ends = _profile_ends(views, space.point(tuned), chosen, allowed)
+    # For the correlations alone: a tile without which nothing is known moves the optimum out of the cube.
+    moves = np.clip(moves, -1.0, 1.0)
+    covariance = moves.T @ moves
     deviation = np.maximum(np.sqrt(np.diag(covariance)), 1e-30)
     correlation = covariance / np.outer(deviation, deviation)
-    ends = [space.parameters(_with(space.point(tuned), chosen, end), tuned) for end in (low, high)]
+    ends = [space.parameters(_with(space.point(tuned), chosen, end), tuned) for end in ends]
     return {
         space.names[axis]: Interval(
             float(getattr(tuned, space.names[axis])),
@@ -128,6 +132,31 @@ def intervals(
         )
         for row, axis in enumerate(chosen)
     }
+
+
+def _profile_ends(
+    views: tuple[FitView, ...],
+    point: Float[np.ndarray, "parameters"],
+    axes: list[int],
+    allowed: Float[np.ndarray, "axes"],
+) -> tuple[Float[np.ndarray, "axes"], Float[np.ndarray, "axes"]]:
+    """Where the profile of each axis has risen by what is allowed; the cube's wall where it never does."""
+    data, residuals = tuple(view.reduced for view in views), all_residuals(SearchSpace())
+    free = np.isin(np.arange(len(point)), axes)
+    ends = np.empty((2, len(axes)))
+    for row, (axis, allowance) in enumerate(zip(axes, allowed, strict=True)):
+        for side, sign in enumerate((-1.0, 1.0)):
+            places = np.clip(point[axis] + sign * np.concatenate([[0.0], REACH]), 0.0, 1.0)
+            squares = profile(residuals, data, point, axis, places, free) * len(views)
+            # Standing still is not beyond what stood still before: a profile of rounded sums may dip.
+            rise = np.maximum.accumulate(np.maximum(squares - squares[0], 0.0))
+            # Roots of rises, which for a parabola are straight lines.
+            ends[side, row] = (
+                np.interp(np.sqrt(allowance), np.sqrt(rise) + 1e-12 * np.arange(len(rise)), places)
+                if rise[-1] > allowance
+                else (0.0, 1.0)[side]
+            )
+    return ends[0], ends[1]
 
 
 def _width(name: str, interval: Interval) -> float:

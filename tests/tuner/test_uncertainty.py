@@ -11,6 +11,7 @@ from benchmarks.planted_problems import planted_problem
 from renderer.artist_parameters import ArtistParameters
 from tuner.binned_gather import gather_binned
 from tuner.commands.metrics_table import parameters_table
+from tuner.descent import profile
 from tuner.fit_views import fit_view
 from tuner.uncertainty import fit_with_intervals
 from tuner.virtual_point_lights import Receivers, VirtualPointLights
@@ -18,6 +19,8 @@ from tuner.vpl_gather import FalloffParameters, gather
 
 SIZE = (40, 30)
 PRIOR = ArtistParameters()
+TILES_APART = np.array([[1.02, 1.07], [0.93, 0.98]])
+"""Factors of a view's tiles, right on average."""
 
 
 def floor_view(height, planted, noise=0.0, misfit=None, seed=0, footprint=0.2):
@@ -63,10 +66,7 @@ def test_a_clean_problem_has_narrow_intervals():
 def test_what_the_views_leave_open_goes_to_the_prior():
     """VPLs far above the floor, each a hundredth as wide as it is far: no α can be told from another."""
     planted = replace(PRIOR, intensity=1.3, falloff_footprint=1.7)
-    views = tuple(
-        floor_view(2.0, planted, 0.03, np.array([[1.0, 1.1], [0.95, 1.02]]), seed=i, footprint=0.02)
-        for i in range(2)
-    )
+    views = tuple(floor_view(2.0, planted, 0.03, TILES_APART, seed=i, footprint=0.02) for i in range(2))
     prior = replace(PRIOR, falloff_footprint=0.8)
     tuned, _, found = fit_with_intervals(views, prior)
     assert not found["falloff_footprint"].determined
@@ -79,8 +79,7 @@ def test_what_the_views_leave_open_goes_to_the_prior():
 def test_parameters_that_do_the_same_are_named():
     """At one and the same distance, the transmittance is but another intensity."""
     planted = replace(PRIOR, intensity=1.1, falloff_footprint=0.8, falloff_transmittance=0.4)
-    misfit = np.array([[1.0, 1.1], [0.95, 1.02]])
-    views = tuple(floor_view(2.0, planted, 0.02, misfit, seed=i, footprint=0.5) for i in range(2))
+    views = tuple(floor_view(2.0, planted, 0.02, TILES_APART, seed=i, footprint=0.5) for i in range(2))
     _, _, found = fit_with_intervals(views, PRIOR)
     assert "falloff_transmittance" in found["intensity"].trades_with
     assert "intensity" in found["falloff_transmittance"].trades_with
@@ -104,6 +103,21 @@ def test_a_binned_picture_is_in_the_view():
     picture = np.asarray(gather_binned(view.binned, FalloffParameters.of(PRIOR)))
     np.testing.assert_allclose(picture, view.target.half_a, rtol=1e-2)
     assert sorted(set(np.asarray(view.tile).tolist())) == [0, 1, 2, 3]
+
+
+def test_a_profile_is_a_parabola_where_the_loss_is_one():
+    """Residuals (x − 0.3, y − 0.6 + x/2): with x held, y makes up for it; with y held as well, it cannot."""
+
+    def residuals(point, _):
+        return jnp.stack([point[0] - 0.3, point[1] - 0.6 + point[0] / 2.0])
+
+    start, places = np.array([0.3, 0.45]), np.linspace(0.0, 1.0, 5)
+    free = np.array([True, True])
+    np.testing.assert_allclose(
+        profile(residuals, None, start, 0, places, free), (places - 0.3) ** 2, atol=1e-6
+    )
+    held = profile(residuals, None, start, 0, places, ~free)
+    np.testing.assert_allclose(held, 1.25 * (places - 0.3) ** 2, atol=1e-6)
 
 
 def test_the_table_tells_what_is_open():

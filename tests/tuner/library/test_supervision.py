@@ -1,5 +1,6 @@
 """A tuning process that is slow, greedy or dead: stopped, replaced, its scene set aside."""
 
+import json
 import os
 import re
 import signal
@@ -13,6 +14,7 @@ import psutil
 import pytest
 
 from renderer.errors import MachineError
+from tuner.__main__ import run
 from tuner.library.attempts import tune_with_retries
 from tuner.library.local_scheduler import tune_locally
 from tuner.library.supervised_process import Limits, StoppedError, SupervisedProcess, memory_of
@@ -158,3 +160,20 @@ def test_refused_scenes_get_a_record_each_from_real_processes(make_job):
     assert sorted(record["name"] for record in records) == [job.name for job in jobs]
     assert not list((Path(jobs[0].folder) / "claims").iterdir())
     assert not psutil.Process().children(recursive=True)
+
+
+def test_the_command_refuses_resumes_and_reports(tmp_path, capfd):
+    """Files that are no scenes, through the command itself: exit 4, and nothing to do the second time."""
+    library = tmp_path / "library"
+    library.mkdir()
+    for index in range(3):
+        (library / f"{index}.glb").write_bytes(b"no scene" * (1 + index // 2 * index))
+    arguments = ["batch", str(library), "-o", str(tmp_path / "out"), "--json", "--workers", "1"]
+    assert run(arguments) == 4
+    first = json.loads(capfd.readouterr().out)
+    assert (first["status"], first["refused"], first["fitted"]) == ("partly done", 2, 2)
+    assert first["copies"] == {"1.glb": "0.glb"}
+    assert run(arguments) == 4
+    shown = capfd.readouterr()
+    assert json.loads(shown.out) == first | {"fitted": 0}
+    assert shown.err == "vpltune: 0 scenes to tune, 2 have a record\n"

@@ -92,12 +92,12 @@ def scene_bundle(
     return SceneBundle(document, bytes(binary.content))
 
 
-def left_out(config: TunedConfig) -> tuple[str, ...]:
+def left_out(config: TunedConfig, *, draws_maps: bool) -> tuple[str, ...]:
     """What of a config is not drawn outside the runtime, a sentence each."""
     sentences = []
-    if config.visibility == "maps":
+    if config.visibility == "maps" and not draws_maps:
         sentences.append(
-            "Visibility maps are drawn by the runtime alone: elsewhere light passes through walls"
+            "Visibility maps are not drawn by the stand-alone reader: light passes through walls"
         )
     if config.parameters.screen_space_strength > 0.0:
         sentences.append("The screen-space near field is drawn by the runtime alone")

@@ -74,7 +74,9 @@ def picture_of(page):
 
 
 def page_text(scene, view, config=CONFIG):
-    return web_page(scene_bundle(scene, view, config, rsm_resolution=RESOLUTION), left_out(config))
+    return web_page(
+        scene_bundle(scene, view, config, rsm_resolution=RESOLUTION), left_out(config, draws_maps=True)
+    )
 
 
 def assert_same(picture, ours):

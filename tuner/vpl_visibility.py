@@ -56,10 +56,14 @@ def hemi_octahedral_decode(encoded: Float[Array, "*n 2"]) -> Float[Array, "*n 3"
     return direction / jnp.linalg.norm(direction, axis=-1, keepdims=True)
 
 
+FRAME_TURNS_OVER = -0.5
+"""Where tangents turn over: not at z = 0, where walls have their normals, and where rounding would decide."""
+
+
 def hemisphere_frame(normal: Float[Array, "vpls 3"]) -> Float[Array, "vpls 3 3"]:
     """Rows: two tangents and the normal, right-handed (Duff et al. 2017). Twin in GLSL."""
     x, y, z = normal[:, 0], normal[:, 1], normal[:, 2]
-    s = jnp.where(z >= 0.0, 1.0, -1.0)
+    s = jnp.where(z >= FRAME_TURNS_OVER, 1.0, -1.0)
     a = -1.0 / (s + z)
     b = x * y * a
     tangent = jnp.stack([1.0 + s * x * x * a, s * b, -s * x], axis=-1)

@@ -159,7 +159,7 @@ function makeScene(bytes) {
     if (anisotropic) gl.texParameterf(gl.TEXTURE_2D, anisotropic.TEXTURE_MAX_ANISOTROPY_EXT, 8);
     return texture;
   });
-  return { vertices, textures };
+  return { vertices, textures, bytes: part };
 }
 
 // Draw all triangles as seen along −Z of a rigid matrix; the target's depth is reversed.
@@ -255,6 +255,7 @@ class Frame {
     }
     const most = bundle.config.parameters.vpl_count;
     this.vpls = makeTarget(bundle.vpl_columns, Math.ceil(most / bundle.vpl_columns), ["RGBA32F", "RGBA32F", "RGBA32F"]);
+    if (this.programs.vpl_visibility_maps) this.makeVisibility(most);
     this.indirect = [0, 1].map(() => makeTarget(width, height, ["RGBA32F"]));
     this.direct = makeTarget(width, height, ["RGBA32F"]);
     this.radiance = makeTarget(width, height, ["RGBA32F"]);
@@ -271,6 +272,29 @@ class Frame {
     const texture = floatTexture(width, height, "RG32F");
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, gl.RG, gl.FLOAT, points);
     return texture;
+  }
+
+  // A tree of boxes over the triangles, and room for a small map of what each VPL sees.
+  makeVisibility(most) {
+    const columns = bundle.data_columns;
+    this.rays = { longest: bundle.diagonal };
+    for (const [name, view, ...format] of [
+      ["ray_nodes", Uint32Array, gl.RGBA32UI, gl.RGBA_INTEGER, gl.UNSIGNED_INT],
+      ["ray_triangles", Float32Array, gl.RGBA32F, gl.RGBA, gl.FLOAT],
+    ]) {
+      const values = new view(this.scene.bytes(name).slice().buffer);
+      const height = values.length / 4 / columns;
+      this.rays[name] = floatTexture(columns, height, { [gl.RGBA32UI]: "RGBA32UI", [gl.RGBA32F]: "RGBA32F" }[format[0]]);
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, columns, height, format[1], format[2], values);
+    }
+    const texels = most * bundle.visibility_map_size ** 2;
+    this.visibility = makeTarget(columns, Math.ceil(texels / columns), ["RG32UI"]);
+  }
+
+  castVisibility(vpl_count) {
+    const [vpl_position_footprint, vpl_normal_area, vpl_flux] = this.vpls.textures;
+    const vpls = { vpl_position_footprint, vpl_normal_area, vpl_flux, vpl_count };
+    fill(this.visibility, this.programs.vpl_visibility_maps, { ...this.rays, ...vpls, ...this.momentSums });
   }
 
   get rsmValues() {
@@ -308,6 +332,7 @@ class Frame {
     const sums = { sums_in_rows: this.sumsInRows, sums_of_rows: this.sumsOfRows, rows, vpl_count };
     const values = { ...this.rsmValues, ...sums, density_exponent: parameters.density_exponent };
     fill(this.vpls, this.programs.virtual_point_lights, { ...values, point_table: this.pointTable });
+    if (this.visibility) this.castVisibility(vpl_count);
   }
 
   sumWeights(state, parameters) {
@@ -350,6 +375,7 @@ class Frame {
     fill(target, this.programs.vpl_gather, {
       ...this.cameraValues(camera), ...parameters, ...this.momentSums, falloff_transmittance, first, end,
       vpl_position_footprint, vpl_normal_area, vpl_flux, earlier: earlier.textures[0],
+      visibility_atlas: this.visibility?.textures[0],
     });
     this.indirect.reverse();
   }

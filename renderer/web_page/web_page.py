@@ -7,7 +7,10 @@ import zlib
 from importlib.resources import files
 from typing import Any
 
+import numpy as np
+
 from renderer.artist_parameters import ARTIST_PARAMETERS
+from renderer.bounding_volumes import COUNT_BITS, LEAF_ITEMS, NODE_DTYPE, build_bounding_volumes
 from renderer.errors import InputError
 from renderer.passes.tone_mapping import EXPOSURE_KEY
 from renderer.scene_bundle import SceneBundle
@@ -15,6 +18,9 @@ from renderer.shader_library import Define, ShaderSource
 
 VPL_COLUMNS = 64
 """VPLs in a row of the textures that hold them."""
+DATA_COLUMNS = 2048
+"""Texels in a row of the textures that hold trees, triangles and visibility maps; every WebGL 2 has so many."""
+_TREE_DEPTH = 60
 
 NOTE = "One bounce of indirect light from virtual point lights, drawn live in this page"
 
@@ -32,7 +38,8 @@ _SHADERS = (
     "web/material_resolve.frag",
     "web/tone_mapping.frag",
 )
-_HEADER = "#version 300 es\nprecision highp float;\nprecision highp int;\nprecision highp sampler2D;\n"
+_MAP_SHADERS = ("web/vpl_visibility_maps.frag",)
+_HEADER = "#version 300 es\nprecision highp float;\nprecision highp int;\nprecision highp sampler2D;\nprecision highp usampler2D;\n#define precise\n"
 
 
 def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
@@ -43,21 +50,28 @@ def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
     """
     if not bundle.document["lights"]:
         raise InputError("web page: the view must have a light")
+    defines = _defines(bundle.document)
+    binary = bundle.binary
+    arrays = {name: at for name, at in bundle.document["arrays"].items() if name not in ("lights", "faces")}
+    if defines["VISIBILITY_MAP_SIZE"]:
+        defines["RAY_ROOT"], trees = _ray_tree(bundle)
+        for name, values in trees.items():
+            content = values.tobytes()
+            arrays[name] = {"offset": len(binary), "bytes": len(content)}
+            binary += content
     document = bundle.document | {
         "vpl_columns": VPL_COLUMNS,
+        "data_columns": DATA_COLUMNS,
         "note": ". ".join([NOTE, *left_out]) + ".",
         "table": _table(),
-        # What only other readers need.
-        "arrays": {
-            name: at for name, at in bundle.document["arrays"].items() if name not in ("lights", "faces")
-        },
+        "arrays": arrays,
     }
     parts = {
         "TITLE": html.escape(f"{bundle.document['scene']} – VPLtune"),
         "STYLE": _text("page.css"),
         "DOCUMENT": _json(document),
-        "BINARY": base64.b64encode(zlib.compress(bundle.binary, 9)).decode("ascii"),
-        "SHADERS": _json(_shaders(bundle.document)),
+        "BINARY": base64.b64encode(zlib.compress(binary, 9)).decode("ascii"),
+        "SHADERS": _json(_shaders(defines)),
         "SCRIPT": _text("page.js") + _text("controls.js"),
     }
     page = _text("page.html")
@@ -69,16 +83,48 @@ def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
     return "".join([*pieces, page])
 
 
-def _shaders(document: dict[str, Any]) -> dict[str, str]:
-    defines: dict[str, Define] = {
+def _defines(document: dict[str, Any]) -> dict[str, Define]:
+    maps = document["config"]["visibility"] == "maps"
+    return {
         "LIGHT_COUNT": len(document["lights"]),
         "RSM_FACE_COUNT": len(document["rsm"]["faces"]),
         "RSM_RESOLUTION": document["rsm"]["resolution"],
         "RSM_FILTERING": document["rsm"]["filtering"],
         "VPL_COLUMNS": VPL_COLUMNS,
+        "DATA_COLUMNS": DATA_COLUMNS,
+        "VISIBILITY_MAP_SIZE": document["visibility_map_size"] if maps else 0,
+        "RAY_COUNT_BITS": COUNT_BITS,
+        "RAY_STACK_SIZE": _TREE_DEPTH,
         "EXPOSURE_KEY": EXPOSURE_KEY,
     }
-    return {name: _web_glsl(name, defines) for name in _SHADERS}
+
+
+def _ray_tree(bundle: SceneBundle) -> tuple[int, dict[str, np.ndarray]]:
+    """The root of a tree of boxes over all triangles, and tree and triangles in whole rows of texels."""
+
+    def array(name: str) -> np.ndarray:
+        at = bundle.document["arrays"][name]
+        count = at["bytes"] // np.dtype(at["type"]).itemsize
+        return np.frombuffer(bundle.binary, at["type"], count, at["offset"]).reshape(at["shape"])
+
+    corners = array("positions")[array("triangles")]
+    tree = build_bounding_volumes(corners.min(axis=1), corners.max(axis=1), LEAF_ITEMS, _TREE_DEPTH)
+    assert NODE_DTYPE.itemsize == 32, "a node is two texels of four 32-bit numbers"
+    padded = np.zeros((*corners.shape[:2], 4), np.float32)
+    padded[..., :3] = corners[tree.order]
+    # An empty tree, of one leaf, still is a texture.
+    nodes = np.frombuffer(tree.nodes.tobytes() or bytes(32), np.uint32)
+    return tree.root, {"ray_nodes": _whole_rows(nodes), "ray_triangles": _whole_rows(padded.ravel())}
+
+
+def _whole_rows(values: np.ndarray) -> np.ndarray:
+    rows = -(-len(values) // (4 * DATA_COLUMNS))
+    return np.concatenate([values, np.zeros(rows * 4 * DATA_COLUMNS - len(values), values.dtype)])
+
+
+def _shaders(defines: dict[str, Define]) -> dict[str, str]:
+    names = _SHADERS + (_MAP_SHADERS if defines["VISIBILITY_MAP_SIZE"] else ())
+    return {name: _web_glsl(name, defines) for name in names}
 
 
 def _web_glsl(name: str, defines: dict[str, Define]) -> str:

@@ -4,9 +4,12 @@
 
 // [vpls, size, size]: what a ray along the texel's axis meets, as its distance [L] in bits of a float, and its
 // normal towards the VPL in the VPL's frame, octahedral in 2 × 16 bits.
+#ifndef VISIBILITY_MAP_ENTRY  // WebGL has no storage buffers, and brings its own
 layout(std430, binding = VISIBILITY_MAPS_BINDING) buffer VisibilityMaps {
     uvec2 visibility_maps[];
 };
+#define VISIBILITY_MAP_ENTRY(index) visibility_maps[index]
+#endif
 
 struct VisibilityParameters {
     float bias;      // of the distance: how far two surfaces may overlap before one shades the other
@@ -48,7 +51,7 @@ float vpl_visibility(
     }
     vec2 place = (hemi_octahedral_encode(to_receiver) * 0.5 + 0.5) * float(VISIBILITY_MAP_SIZE);
     ivec2 texel = min(ivec2(place), ivec2(VISIBILITY_MAP_SIZE - 1));
-    uvec2 met = visibility_maps[map_start + texel.y * VISIBILITY_MAP_SIZE + texel.x];
+    uvec2 met = VISIBILITY_MAP_ENTRY(map_start + texel.y * VISIBILITY_MAP_SIZE + texel.x);
     vec3 end = visibility_axis(texel) * uintBitsToFloat(met.x);
     vec3 met_normal = octahedral_decode(unpackUnorm2x16(met.y));
     float before = dot(end, normal) - plane;

@@ -6,6 +6,12 @@
 const float PI = 3.14159265358979;
 #include "common/vpl_irradiance.glsl"
 #include "web/vpl_texture.glsl"
+#if VISIBILITY_MAP_SIZE > 0
+#include "web/visibility_atlas.glsl"
+
+uniform float visibility_bias;
+uniform float visibility_softness;
+#endif
 
 uniform sampler2D earlier;
 uniform int first;
@@ -27,8 +33,18 @@ void main() {
     float scene_length = measured_scene_length();
     vec3 irradiance = vec3(0.0);
     for (int i = first; i < end; ++i) {
-        irradiance += vpl_irradiance(
-            receiver.position_world, receiver.normal_world, vpl_at(i), scene_length, parameters);
+        VirtualPointLight vpl = vpl_at(i);
+        vec3 unoccluded = vpl_irradiance(
+            receiver.position_world, receiver.normal_world, vpl, scene_length, parameters);
+#if VISIBILITY_MAP_SIZE > 0
+        if (any(greaterThan(unoccluded, vec3(0.0)))) {
+            unoccluded *= vpl_visibility(
+                receiver.position_world, receiver.normal_world, vpl, hemisphere_frame(vpl.normal_area.xyz),
+                i * (VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE), scene_length,
+                VisibilityParameters(visibility_bias, visibility_softness));
+        }
+#endif
+        irradiance += unoccluded;
     }
     out_irradiance.rgb += irradiance;
 }

@@ -171,8 +171,9 @@ def _write_with_view(config: "TunedConfig", to: Form, output: Path, bundle: "Sce
     from renderer.scene_bundle import left_out, write_bundle
     from renderer.web_page import web_page
 
-    warn(left_out(config))
+    unseen = left_out(config, draws_maps=to == "web")
+    warn(unseen)
     if to == "bundle":
         write_bundle(output, bundle)
     else:
-        write_text_whole(output, web_page(bundle, left_out(config)))
+        write_text_whole(output, web_page(bundle, unseen))

@@ -106,6 +106,14 @@ def test_the_picture_is_the_runtimes(opened, light):
     assert_same_picture(opened(page_text(scene, view)), scene, view)
 
 
+def test_visibility_maps_are_cast_in_the_page(opened):
+    scene, view, config = textured_room(), web_view("spot"), dataclasses.replace(CONFIG, visibility="maps")
+    page = opened(page_text(scene, view, config))
+    assert_same_picture(page, scene, view, config)
+    plain = renderer.Runtime(scene, CONFIG, rsm_resolution=RESOLUTION).render(view)
+    assert (np.abs(picture_of(page) - plain).max(axis=-1) > 3).mean() > 0.1
+
+
 def test_it_goes_on_being_the_runtimes_when_things_move(opened):
     """Camera and light by keys, parameters by a button; the runtime draws from where things then are."""
     scene, view = textured_room(), web_view("spot", (96, 72))
@@ -183,13 +191,13 @@ def test_it_is_legible_in_the_dark_and_on_a_small_screen(opened, scheme):
 
 def test_names_cannot_break_out_and_what_is_left_out_is_said(opened):
     name = "</script><script>document.title='broken'</script>"
-    config = dataclasses.replace(CONFIG, visibility="maps", provenance={"scene": name})
-    page = opened(
-        page_text(dataclasses.replace(textured_room(), name=name), web_view("spot", (16, 12)), config)
-    )
+    parameters = dataclasses.replace(CONFIG.parameters, screen_space_strength=1.0)
+    config = TunedConfig(parameters, {"scene": name})
+    scene = dataclasses.replace(textured_room(), name=name)
+    page = opened(page_text(scene, web_view("spot", (16, 12)), config))
     assert page.title() == f"{name} – VPLtune"
     assert page.inner_text("h1") == name
-    assert "Visibility maps are drawn by the runtime alone" in page.inner_text("#note")
+    assert "near field is drawn by the runtime alone" in page.inner_text("#note")
 
 
 def test_the_command_writes_one_file(tmp_path, capfd):

@@ -128,18 +128,40 @@ function fill(target, program, values) {
 }
 
 // --- the scene ----------------------------------------------------------------------------------------------------
+// Every triangle with corners of its own, so that they can carry its plane.
+function unshared(values, corners, width) {
+  const result = new Float32Array(width * corners.length);
+  corners.forEach((vertex, i) => { for (let k = 0; k < width; ++k) result[width * i + k] = values[width * vertex + k]; });
+  return result;
+}
+
+function planeNormals(positions) {
+  const result = new Float32Array(positions.length);
+  for (let i = 0; i < positions.length; i += 9) {
+    const [a, b, c] = [0, 3, 6].map((at) => Array.from(positions.subarray(i + at, i + at + 3)));
+    const across = cross(add(b, a, -1), add(c, a, -1));
+    const length = Math.hypot(...across) || 1;
+    for (let k = 0; k < 9; ++k) result[i + k] = across[k % 3] / length;
+  }
+  return result;
+}
+
 function makeScene(bytes) {
   const part = (name) => bytes.subarray(bundle.arrays[name].offset, bundle.arrays[name].offset + bundle.arrays[name].bytes);
   const vertices = gl.createVertexArray();
   gl.bindVertexArray(vertices);
-  ["positions", "normals", "uv", "base_colors"].forEach((name, place) => {
-    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ARRAY_BUFFER, part(name), gl.STATIC_DRAW);
-    gl.enableVertexAttribArray(place);
-    gl.vertexAttribPointer(place, bundle.arrays[name].shape[1], gl.FLOAT, false, 0, 0);
+  const corners = new Uint32Array(part("triangles").slice().buffer);
+  const attributes = ["positions", "normals", "uv", "base_colors"].map((name) => {
+    const width = bundle.arrays[name].shape[1];
+    return [unshared(new Float32Array(part(name).slice().buffer), corners, width), width];
   });
-  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, part("triangles"), gl.STATIC_DRAW);
+  attributes.push([planeNormals(attributes[0][0]), 3]);
+  attributes.forEach(([values, width], place) => {
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
+    gl.enableVertexAttribArray(place);
+    gl.vertexAttribPointer(place, width, gl.FLOAT, false, 0, 0);
+  });
   gl.bindVertexArray(null);
   const anisotropic = gl.getExtension("EXT_texture_filter_anisotropic");
   const textures = bundle.textures.map((entry) => {
@@ -173,7 +195,7 @@ function drawScene(scene, program, toWorld, extent, orthographic, values) {
   for (const draw of bundle.draws) {
     const { mirrored } = bundle.textures[draw.texture];
     use(program, { ...values, to_clip: toClip, base_color_texture: scene.textures[draw.texture], mirrored });
-    gl.drawElements(gl.TRIANGLES, 3 * draw.count, gl.UNSIGNED_INT, 12 * draw.first);
+    gl.drawArrays(gl.TRIANGLES, 3 * draw.first, 3 * draw.count);
   }
 }
 
@@ -323,7 +345,8 @@ class Frame {
       gl.enable(gl.SCISSOR_TEST);
       gl.scissor(face.origin[1], face.origin[0], resolution, resolution);
       const { light_to_world, extent, orthographic } = face;
-      drawScene(this.scene, this.programs.reflective_shadow_map, light_to_world, extent, orthographic, { face_index });
+      const values = { face_index, tile_origin: [face.origin[1], face.origin[0]] };
+      drawScene(this.scene, this.programs.reflective_shadow_map, light_to_world, extent, orthographic, values);
       gl.disable(gl.SCISSOR_TEST);
     });
     this.sumWeights(state, parameters);
@@ -362,7 +385,10 @@ class Frame {
   drawCamera(camera) {
     clear(this.gbuffer);
     gl.viewport(0, 0, this.gbuffer.width, this.gbuffer.height);
-    const values = { world_to_camera: rigidInverse(camera), near_plane: bundle.view.near_plane, eye_world: column(camera, 3) };
+    const values = {
+      world_to_camera: rigidInverse(camera), camera_to_world: camera, eye_world: column(camera, 3),
+      near_plane: bundle.view.near_plane, tan_half_fov: bundle.view.tan_half_fov, picture_size: bundle.view.size,
+    };
     drawScene(this.scene, this.programs.geometry, camera, bundle.view.tan_half_fov, false, values);
     fill(this.direct, this.programs.direct_light, { ...this.cameraValues(camera), ...this.rsmValues });
   }

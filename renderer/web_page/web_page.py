@@ -19,7 +19,7 @@ from renderer.shader_library import Define, ShaderSource
 VPL_COLUMNS = 64
 """VPLs in a row of the textures that hold them."""
 DATA_COLUMNS = 2048
-"""Texels in a row of the textures that hold trees, triangles and visibility maps; every WebGL 2 has so many."""
+"""Texels in a row of the textures that hold trees, triangles and visibility maps; any WebGL 2 has so many."""
 _TREE_DEPTH = 60
 
 NOTE = "One bounce of indirect light from virtual point lights, drawn live in this page"
@@ -39,7 +39,13 @@ _SHADERS = (
     "web/tone_mapping.frag",
 )
 _MAP_SHADERS = ("web/vpl_visibility_maps.frag",)
-_HEADER = "#version 300 es\nprecision highp float;\nprecision highp int;\nprecision highp sampler2D;\nprecision highp usampler2D;\n#define precise\n"
+_HEADER = """#version 300 es
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+precision highp usampler2D;
+#define precise
+"""
 
 
 def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:

@@ -39,7 +39,7 @@ void main() {
 #if VISIBILITY_MAP_SIZE > 0
         if (any(greaterThan(unoccluded, vec3(0.0)))) {
             unoccluded *= vpl_visibility(
-                receiver.position_world, receiver.normal_world, vpl, hemisphere_frame(vpl.normal_area.xyz),
+                receiver.position_world, receiver.normal_world, vpl,
                 i * (VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE), scene_length,
                 VisibilityParameters(visibility_bias, visibility_softness));
         }

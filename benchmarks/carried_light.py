@@ -73,11 +73,10 @@ def write_carried_light(folder: Path) -> None:
     """carried_light.mp4: each picture over the parameters' curves; carried_light.png: four of its frames."""
     clip = carried_light()
     runtime = auto_runtime(clip)
-    pictures, values, exposure = [], [], None
+    pictures, values = [], []
     for view in clip.views:
-        pictures.append(runtime.render(view, exposure=exposure))
+        pictures.append(runtime.render(view))
         values.append([runtime.drawn_parameters().as_dict()[name] for name in AUTO_PARAMETERS])
-        exposure = runtime.exposure() if exposure is None else exposure
     curves, columns = _curves(np.array(values))
     frames = []
     for picture, column in zip(pictures, columns, strict=True):
@@ -101,8 +100,9 @@ def _curves(values: np.ndarray) -> tuple[UInt8[np.ndarray, "height width 3"], In
     axes = figure.add_axes((0.09, 0.14, 0.72, 0.8))
     for name, curve in zip(AUTO_PARAMETERS, values.T, strict=True):
         label = f"{parameter_spec(name).symbol}  {name.rpartition('_')[2]}"
-        axes.semilogy(np.maximum(curve, 1e-3), label=label, linewidth=1.0)
+        axes.plot(curve / parameter_spec(name).default, label=label, linewidth=1.0)
     axes.set_xlim(0, len(values) - 1)
+    axes.set_ylabel("of the default", fontsize=6)
     axes.tick_params(labelsize=6)
     axes.legend(fontsize=6, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
     canvas.draw()

@@ -5,7 +5,8 @@ rises out of it. The figure is the mean absolute change of indirect irradiance f
 mean irradiance, less that of a stand-in for the truth: the same frames with 16 times the VPLs from an RSM
 with twice the resolution.
 
-`python -m benchmarks.motion FOLDER` writes the plot of every step, motion.png, and the swept spot's clip.
+`python -m benchmarks.motion FOLDER` writes the plot of every step, motion.png, and the swept spot's clip;
+`python -m benchmarks.motion FOLDER box` writes box.mp4, a box carried through a room, with visibility maps.
 """
 
 import sys
@@ -123,10 +124,7 @@ def rising_bounds() -> Clip:
     """The courtyard's smallest part rises out of it, whose bounds double in height; the sun stands still."""
     scene, view = _shipped("courtyard")
     low, high = scene.bounds()
-    smallest = min(
-        range(len(scene.instances)),
-        key=lambda index: np.ptp(scene.meshes[scene.instances[index].mesh].positions, axis=0).max(),
-    )
+    smallest = _smallest_part(scene)
     transforms = []
     for share in _shares():
         placed = np.array([instance.to_world for instance in scene.instances])
@@ -181,13 +179,35 @@ def write_plot(path: Path, changes: dict[str, dict[str, np.ndarray]]) -> None:
         figure.savefig(temporary, dpi=90)
 
 
-def write_sweep(path: Path, size: tuple[int, int] = (480, 360)) -> None:
-    """The swept spot's final pictures as a clip."""
-    clip = swept_spot()
-    runtime = Runtime(clip.scene)
+def carried_box() -> Clip:
+    """The Cornell box's smallest part is carried from side to side under its lamp."""
+    scene, view = _shipped("cornell-box")
+    low, high = scene.bounds()
+    smallest = _smallest_part(scene)
+    transforms = []
+    for share in _shares():
+        placed = np.array([instance.to_world for instance in scene.instances])
+        across = np.sin(2.0 * np.pi * share)
+        placed[smallest, :3, 3] += (high - low) * np.array([0.15 * across, 0.12, 0.0])
+        transforms.append(placed)
+    return Clip("box", ("both",), scene, (view,) * FRAMES, tuple(transforms))
+
+
+def _smallest_part(scene: Scene) -> int:
+    return min(
+        range(len(scene.instances)),
+        key=lambda index: np.ptp(scene.meshes[scene.instances[index].mesh].positions, axis=0).max(),
+    )
+
+
+def write_clip(path: Path, clip: Clip, config: TunedConfig, size: tuple[int, int] = (480, 360)) -> None:
+    """A clip's final pictures."""
+    runtime = Runtime(clip.scene, config)
     exposure = None
     with clip_writer(path, size, 30.0) as write:
-        for view in clip.views:
+        for frame, view in enumerate(clip.views):
+            if clip.transforms is not None:
+                runtime.scene_buffers.set_pose(clip.transforms[frame], np.zeros((0, 4, 4)))
             write(runtime.render(replace(view, size=size), exposure=exposure))
             exposure = runtime.exposure() if exposure is None else exposure
 
@@ -198,8 +218,11 @@ def _main(folder: Path) -> None:
         for clip in (swept_spot(), rising_bounds())
     }
     write_plot(folder / "motion.png", changes)
-    write_sweep(folder / "motion.mp4")
+    write_clip(folder / "motion.mp4", swept_spot(), TunedConfig())
 
 
 if __name__ == "__main__":
-    _main(Path(sys.argv[1]))
+    if sys.argv[2:] == ["box"]:
+        write_clip(Path(sys.argv[1]) / "box.mp4", carried_box(), TunedConfig(visibility="maps"))
+    else:
+        _main(Path(sys.argv[1]))

@@ -1,0 +1,172 @@
+"""What each kind of visibility leaves of the error: none, mean transmittance, maps, rays; untuned and tuned.
+
+Every scene that can be loaded, three views with a light position each, `VPLS` VPLs: fitted on two of them,
+measured on those and on the third. The ceiling has the same VPLs and rays towards every pixel.
+
+`python -m benchmarks.visibility_quality FILE [SCENE …]` writes each scene's figures into a JSON file as they
+come, keeps what is there, and ends with the summary: a long run may be done in pieces.
+"""
+
+import json
+import sys
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+
+from benchmarks.row import Row
+from benchmarks.scene_library import present_scenes
+from renderer.artist_parameters import ArtistParameters
+from renderer.atomic_file import write_text_whole
+from renderer.tuned_config import TunedConfig, Visibility
+from tuner.captured_view import CapturedView, runtime_irradiance
+from tuner.evaluate import SPLITS, surrogate_irradiance
+from tuner.fit_falloff import fit_falloff, fit_to, fit_views
+from tuner.fit_visibility import fit_visibility
+from tuner.prepare_scene import PreparedScene, SceneOptions, Stopwatch, prepare_scene
+from tuner.reference import ray_traced_visibility
+from tuner.view_metrics import mean_metrics, view_metrics
+
+VPLS = 256
+MODES: tuple[Visibility, ...] = ("none", "transmittance", "maps")
+CEILING = "ceiling"
+STATES = ("untuned", "tuned")
+DEFAULT = ArtistParameters(vpl_count=VPLS)
+
+Figures = dict[str, dict[str, dict[str, dict[str, float]]]]
+"""By mode, state and split: relmse, energy_ratio, flip."""
+
+
+def rows(progress: Callable[[str, float], None]) -> list[Row]:
+    """The summary, then for each scene, mode, state and split its relMSE against the ceiling's, its energy
+    against the reference's and its HDR-FLIP against the ceiling's."""
+    scenes = present_scenes()
+    measured = {}
+    for index, name in enumerate(scenes):
+        progress(f"visibility_quality: {name}", index / len(scenes))
+        measured[name] = scene_figures(scenes[name])
+    progress("visibility_quality", 1.0)
+    return [*summary_rows(measured), *(row for name in measured for row in _rows_of(name, measured[name]))]
+
+
+def scene_figures(path: Path) -> Figures:
+    """All figures of one scene."""
+    figures: Figures = {}
+    for mode in MODES:
+        prepared = _prepared(path, mode)
+        tuned = _tuned(_of_fitted(prepared.views), mode)
+        figures[mode] = {
+            state: _figures(
+                prepared.views, lambda view, p=parameters, r=prepared.runtime: runtime_irradiance(r, p, view)
+            )
+            for state, parameters in zip(STATES, (DEFAULT, tuned), strict=True)
+        }
+    seen = {view.view.name: _rays(prepared, view) for view in prepared.views}
+    fitted = _of_fitted(prepared.views)
+    tuned, _ = fit_falloff(fitted, DEFAULT, visibility=tuple(seen[view.view.name] for view in fitted))
+    figures[CEILING] = {
+        state: _figures(
+            prepared.views, lambda view, p=parameters: surrogate_irradiance(view, p, seen[view.view.name])
+        )
+        for state, parameters in zip(STATES, (DEFAULT, tuned), strict=True)
+    }
+    return figures
+
+
+def summary_rows(measured: dict[str, Figures]) -> list[Row]:
+    """Over scenes and splits: the median and the worst ratio of maps to ceiling, in relMSE."""
+    found = []
+    for state in STATES:
+        ratios = {
+            f"{name}.{split}": figures["maps"][state][split]["relmse"] / ceiling
+            for name, figures in measured.items()
+            for split in SPLITS
+            # A scene without indirect light has nothing to compare.
+            if (ceiling := figures[CEILING][state][split]["relmse"]) > 1e-6
+        }
+        worst = max(ratios, key=lambda name: ratios[name])
+        found += [
+            Row(f"maps_over_ceiling_{state}_median", median(ratios.values()), "1", "limit", 1.5),
+            Row(f"maps_over_ceiling_{state}_worst", ratios[worst], "1", f"limit; {worst}", 3.0),
+        ]
+    return found
+
+
+def _prepared(path: Path, mode: Visibility) -> PreparedScene:
+    config = TunedConfig(DEFAULT, visibility=mode)
+    return prepare_scene(path, SceneOptions(views=2), config, Stopwatch(), lambda stage, share: None)
+
+
+def _of_fitted(views: tuple[CapturedView, ...]) -> tuple[CapturedView, ...]:
+    return tuple(view for view in views if view.view.split == "fitted")
+
+
+def _tuned(views: tuple[CapturedView, ...], mode: Visibility) -> ArtistParameters:
+    if mode == "none":
+        return fit_to(fit_views(views, DEFAULT), DEFAULT, held=frozenset({"falloff_transmittance"}))[0]
+    start = fit_visibility(views, DEFAULT)[0] if mode == "maps" else DEFAULT
+    return fit_falloff(views, start)[0]
+
+
+def _rays(prepared: PreparedScene, view: CapturedView) -> np.ndarray:
+    captured = view.captured
+    return ray_traced_visibility(
+        prepared.scene,
+        captured.position_world[captured.valid].astype(np.float64),
+        captured.normal_world[captured.valid],
+        captured.vpl_position_world.astype(np.float64),
+        captured.vpl_normal_world,
+    )
+
+
+def _figures(
+    views: tuple[CapturedView, ...], irradiance: Callable[[CapturedView], np.ndarray]
+) -> dict[str, dict[str, float]]:
+    found = {}
+    for split in SPLITS:
+        metrics = []
+        for view in views:
+            if view.view.split == split:
+                picture = irradiance(view)
+                radiances = view.runtime_radiance(picture), view.reference_radiance()
+                metrics.append(view_metrics(picture, view.reference.irradiance, *radiances, view.valid))
+        found[split] = asdict(mean_metrics(metrics))
+    return found
+
+
+def _rows_of(name: str, figures: Figures) -> list[Row]:
+    return [
+        row
+        for mode in figures
+        for state in STATES
+        for split in SPLITS
+        for row in _figure_rows(
+            f"{name}.{split}.{mode}.{state}", *(figures[m][state][split] for m in (mode, CEILING))
+        )
+    ]
+
+
+def _figure_rows(name: str, own: dict[str, float], ceiling: dict[str, float]) -> list[Row]:
+    return [
+        Row(f"{name}.relmse", own["relmse"], "1", CEILING, ceiling["relmse"]),
+        Row(f"{name}.energy_ratio", own["energy_ratio"], "1", "the reference", 1.0),
+        Row(f"{name}.flip", own["flip"], "1", CEILING, ceiling["flip"]),
+    ]
+
+
+def _main(path: Path, names: list[str]) -> None:
+    measured = json.loads(path.read_text()) if path.exists() else {}
+    scenes = present_scenes()
+    for name in names or list(scenes):
+        if name not in measured:
+            measured[name] = scene_figures(scenes[name])
+            write_text_whole(path, json.dumps(measured, indent=1) + "\n")
+            print(name, flush=True)
+    for row in summary_rows(measured):
+        print(f"{row.name} {row.value:.3f} ({row.against} {row.against_value:g})")
+
+
+if __name__ == "__main__":
+    _main(Path(sys.argv[1]), sys.argv[2:])

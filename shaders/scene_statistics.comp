@@ -22,7 +22,7 @@ shared ReceiverSums sums[STATISTICS_GROUP_SIZE];
 float seen(Receiver receiver, VirtualPointLight vpl, int index) {
 #if VISIBILITY_MAP_SIZE > 0
     return vpl_visibility(
-        receiver.position_world, receiver.normal_world, vpl, hemisphere_frame(vpl.normal_area.xyz),
+        receiver.position_world, receiver.normal_world, vpl,
         index * (VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE), scene_length,
         VisibilityParameters(STATISTICS_BIAS, STATISTICS_SOFTNESS));
 #else

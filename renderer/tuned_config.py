@@ -4,7 +4,7 @@
 
 `parameters` holds every name of the table in `renderer.artist_parameters` and nothing else.
 `visibility` ("none", "transmittance", "maps") says what stands for occluders; a file without it means
-"transmittance". `auto` is optional: a learnt prior (`renderer.auto_prior`) that sets some of the parameters
+"maps". `auto` is optional: a learnt prior (`renderer.auto_prior`) that sets some of the parameters
 anew in every frame; it goes with "maps". `provenance` is optional, says where the numbers come from, and is
 never acted on.
 """
@@ -34,6 +34,7 @@ LARGEST_NUMBER = sys.float_info.max
 
 Visibility = Literal["none", "transmittance", "maps"]
 VISIBILITIES: tuple[Visibility, ...] = get_args(Visibility)
+DEFAULT_VISIBILITY: Visibility = "maps"
 
 Provenance = Mapping[str, str | int | float]
 
@@ -45,7 +46,7 @@ class TunedConfig:
     parameters: ArtistParameters = field(default_factory=ArtistParameters)
     provenance: Provenance = field(default_factory=dict)
     """Free-form names to strings or finite numbers."""
-    visibility: Visibility = "transmittance"
+    visibility: Visibility = DEFAULT_VISIBILITY
     """What stands for occluders between VPLs and surfaces: nothing, the mean transmittance exp(−κ·d/L), or a
     small map of what each VPL sees, with the transmittance for what the maps cannot resolve."""
 
@@ -112,7 +113,7 @@ def parse_config(text: str, where: str) -> TunedConfig:
     return TunedConfig(
         parameters=ArtistParameters.validated(parameters, f"{where}: parameters"),
         provenance=_checked_provenance(document.get("provenance", {}), where),
-        visibility=_checked_visibility(document.get("visibility", "transmittance"), where),
+        visibility=_checked_visibility(document.get("visibility", DEFAULT_VISIBILITY), where),
         auto=_checked_auto(document, where),
     )
 
@@ -183,7 +184,7 @@ def config_schema() -> dict[str, Any]:
             "visibility": {
                 "description": "What stands for occluders between VPLs and surfaces.",
                 "enum": list(VISIBILITIES),
-                "default": "transmittance",
+                "default": DEFAULT_VISIBILITY,
             },
             "auto": auto_schema(),
             "provenance": {

@@ -18,7 +18,7 @@ void main() {
     VirtualPointLight vpl = virtual_point_lights[vpl_index];
     bool lit = any(greaterThan(vpl.flux.rgb, vec3(0.0)));
     mat3 frame = hemisphere_frame(vpl.normal_area.xyz);
-    vec3 origin = visibility_origin(vpl);
+    vec3 origin = visibility_origin(vpl, scene_length);
     const int texels = VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE;
     for (int i = int(gl_LocalInvocationIndex); i < texels; i += 64) {
         ivec2 texel = ivec2(i % VISIBILITY_MAP_SIZE, i / VISIBILITY_MAP_SIZE);

@@ -30,7 +30,8 @@ WITHOUT_US = (
 CONFIG = TunedConfig(
     ArtistParameters(
         intensity=1.3, falloff_footprint=0.8, falloff_transmittance=0.4, vpl_count=200, density_exponent=0.7
-    )
+    ),
+    visibility="transmittance",
 )
 
 

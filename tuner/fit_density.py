@@ -24,6 +24,7 @@ from tuner.captured_view import CapturedView
 from tuner.fit_falloff import fit_falloff
 from tuner.fit_status import Descent
 from tuner.losses.relative_squared_error import DARK_SHARE
+from tuner.search_space import held_for
 
 ROTATIONS = 8
 """Of each view. The first is none at all, which is the one that the runtime draws with."""
@@ -113,11 +114,12 @@ def fit_density(
     grid = [(start.density_exponent, start.density_importance)]
     grid += [(exponent, importance) for exponent in _GRID for importance in _GRID]
     grid = list(dict.fromkeys(grid))
+    held = held_for(runtime.visibility)
 
     def measure(densities: tuple[float, float]) -> None:
         candidate = replace(start, density_exponent=densities[0], density_importance=densities[1])
         captured = rotated_views(runtime, views, candidate, chosen)
-        fits[densities] = fit_falloff(captured, candidate, seed=seed)
+        fits[densities] = fit_falloff(captured, candidate, seed=seed, held=held)
         if progress is not None:
             progress(len(fits) / (len(grid) + 1))
 

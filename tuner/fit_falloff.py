@@ -34,6 +34,7 @@ def fit_falloff(
     *,
     seed: int = 0,
     steps: int = STEPS,
+    held: frozenset[str] = frozenset(),
     visibility: tuple[Bool[np.ndarray, "receivers vpls"], ...] | None = None,
     even_share: float = EVEN_SHARE,
     progress: Callable[[float], None] | None = None,
@@ -44,6 +45,7 @@ def fit_falloff(
         views: what to fit to; at least one.
         start: where to begin, and what the other parameters stay at.
         seed: of the choice of pixels.
+        held: names of parameters that stay at the start's.
         visibility: for each view, of every valid pixel and VPL; None takes what the runtime itself knows
             of it, from the views' visibility maps where they have them.
         even_share: weight of plain squared error beside relMSE, see `tuner.losses`.
@@ -52,6 +54,7 @@ def fit_falloff(
     return fit_to(
         fit_views(views, start, seed=seed, visibility=visibility, even_share=even_share),
         start,
+        held=held,
         steps=steps,
         progress=progress,
     )

@@ -26,7 +26,7 @@ from tuner.fit_status import Descent
 from tuner.fit_visibility import fit_visibility
 from tuner.prepare_scene import PreparedScene, Progress, SceneOptions, Stopwatch, prepare_scene
 from tuner.reference.content_key import scene_digest
-from tuner.search_space import SearchSpace
+from tuner.search_space import SearchSpace, held_for
 from tuner.uncertainty import Interval, fit_with_intervals, intervals
 from tuner.view_pictures import write_view_pictures
 
@@ -189,7 +189,9 @@ def _fitted(
         if options.start.visibility == "maps":
             start, _ = fit_visibility(views, start, seed=seed)
         ready = fit_views(views, start, seed=seed)
-        tuned, descent, known = fit_with_intervals(ready, start, progress=report)
+        tuned, descent, known = fit_with_intervals(
+            ready, start, held=held_for(options.start.visibility), progress=report
+        )
         return tuned, descent, known, prepared.views, {}
     # The VPLs are others now, in number and in place.
     prepared.runtime.parameters = tuned
@@ -199,7 +201,8 @@ def _fitted(
         return tuned, descent, {}, captured, found
     # Of one rotation: several of one view err together, and would pass for so many witnesses.
     ready = fit_views(_of_fitted(captured), tuned, seed=seed)
-    return tuned, descent, intervals(ready, tuned, frozenset(SearchSpace().names)), captured, found
+    names = frozenset(SearchSpace().names) - held_for(options.start.visibility)
+    return tuned, descent, intervals(ready, tuned, names), captured, found
 
 
 def _of_fitted(views: tuple[CapturedView, ...]) -> tuple[CapturedView, ...]:
@@ -208,6 +211,9 @@ def _of_fitted(views: tuple[CapturedView, ...]) -> tuple[CapturedView, ...]:
 
 def fit_start(config: TunedConfig, drawn: Sequence[ArtistParameters]) -> ArtistParameters:
     """The config's parameters; of a prior, the mean in the unit cube of what views were drawn with."""
+    if config.visibility == "none":
+        # What the runtime does not look at shall not look as if it did.
+        return replace(config.parameters, falloff_transmittance=0.0)
     if config.auto is None:
         return config.parameters
     values = {}

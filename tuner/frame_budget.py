@@ -30,6 +30,7 @@ from tuner.fit_density import (
 from tuner.fit_falloff import fit_falloff
 from tuner.fit_status import Descent
 from tuner.prepare_scene import PreparedScene
+from tuner.search_space import held_for
 
 AIM = 0.97
 """Of the budget: what a frame is settled at, so that noise does not carry it over."""
@@ -221,7 +222,7 @@ class FrameBudget:
     def _falloff_at(self, parameters: ArtistParameters) -> ArtistParameters:
         rotations = table_rotations(HELD_OUT_ROTATIONS, self._seed)
         captured = rotated_views(self._prepared.runtime, self._views, parameters, rotations)
-        return fit_falloff(captured, parameters, seed=self._seed)[0]
+        return fit_falloff(captured, parameters, seed=self._seed, held=held_for(self._start.visibility))[0]
 
     def _runtime(self, choice: FrameChoice) -> Runtime:
         if choice not in self._runtimes:

@@ -7,10 +7,16 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters, ParameterSpec
+from renderer.tuned_config import Visibility
 
 VISIBILITY_SPECS = tuple(spec for spec in ARTIST_PARAMETERS if spec.name.startswith("visibility_"))
 """Those of visibility maps, fitted in turns with the others (`tuner.fit_visibility`)."""
 FALLOFF_SPECS = tuple(spec for spec in ARTIST_PARAMETERS if spec.fitted and spec not in VISIBILITY_SPECS)
+
+
+def held_for(visibility: Visibility) -> frozenset[str]:
+    """Parameters that the runtime does not look at with `visibility`, and a fit must not move."""
+    return frozenset({"falloff_transmittance"}) if visibility == "none" else frozenset()
 
 
 @dataclass(frozen=True)

@@ -62,34 +62,41 @@ def fit_with_intervals(
     views: tuple[FitView, ...],
     prior: ArtistParameters,
     *,
+    held: frozenset[str] = frozenset(),
     progress: Callable[[float], None] | None = None,
 ) -> tuple[ArtistParameters, Descent, dict[str, Interval]]:
     """Fit from `prior`, and go back to it in what the views leave open, one by one, refitting the rest.
 
-    A parameter is left open where its interval is wide and going back costs next to nothing.
+    A parameter is left open where its interval is wide and going back costs next to nothing. Those in `held`
+    stay at the prior, and have no interval.
     """
-    tuned, descent = fit_to(views, prior, progress=progress)
+    names = frozenset(SearchSpace().names) - held
+    tuned, descent = fit_to(views, prior, held=held, progress=progress)
     if descent.status.failed:
         return tuned, descent, {}
     found: dict[str, Interval] = {}
     offset = float(np.mean([view.reduced.offset for view in views]))
-    known = intervals(views, tuned, frozenset(SearchSpace().names))
+    known = intervals(views, tuned, names)
     trades = {name: interval.trades_with for name, interval in known.items()}
     for name in sorted(known, key=lambda name: -_width(name, known[name])):
         interval = known[name]
         if name == "intensity" or _width(name, interval) <= OPEN_SHARE:
             continue
-        held, at_prior = fit_to(views, prior, held=frozenset({name, *found}))
+        without, at_prior = fit_to(views, prior, held=held | {name, *found})
         if at_prior.loss - descent.loss > PRIOR_COST * (descent.loss - offset):
             continue
         found[name] = replace(interval, value=float(getattr(prior, name)), determined=False)
-        tuned, descent = held, at_prior
-        known = intervals(views, tuned, frozenset(SearchSpace().names) - frozenset(found)) | found
+        tuned, descent = without, at_prior
+        known = intervals(views, tuned, names - frozenset(found)) | found
     # With whom a parameter trades is asked of all of them together, before any was held.
     return (
         tuned,
         descent,
-        {name: replace(known[name], trades_with=trades[name]) for name in SearchSpace().names},
+        {
+            name: replace(known[name], trades_with=trades[name])
+            for name in SearchSpace().names
+            if name in names
+        },
     )
 
 

@@ -12,7 +12,8 @@ from renderer.capture import CapturedFrame, VisibilityMaps
 from tuner.virtual_point_lights import Receivers, VirtualPointLights
 
 VISIBILITY_LIFT = 0.01
-"""Footprints by which a map's origin is lifted off the VPL's surface; twin of the shader's constant."""
+VISIBILITY_LEAST_LIFT = 1e-3
+"""Lift of a map's origin off its surface: footprints, and units of L at least. Twins in GLSL."""
 CHUNK = 128
 """Receivers at once: 128 × 1,024 pairs are half a MiB an array, nine with vectors."""
 
@@ -119,7 +120,8 @@ def surface_overlap(
     # Every map is square.
     size = round((texels.end.shape[0] / max(1, len(vpls.position))) ** 0.5)
     frame = hemisphere_frame(vpls.normal)
-    origin = vpls.position + VISIBILITY_LIFT * vpls.footprint[:, None] * vpls.normal
+    lift = jnp.maximum(VISIBILITY_LIFT * vpls.footprint, VISIBILITY_LEAST_LIFT)
+    origin = vpls.position + lift[:, None] * vpls.normal
     first = jnp.arange(len(vpls.position)) * size * size
 
     def chunk(inputs: tuple[Array, Array]) -> Array:

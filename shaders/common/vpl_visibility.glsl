@@ -16,11 +16,15 @@ struct VisibilityParameters {
     float softness;  // of the distance, over which light then fades out
 };
 
-// Rays start, and distances count, from a point lifted off the VPL's surface by this many footprints.
+// Rays start, and distances count, from a point lifted off the VPL's surface: by this many footprints, and by
+// this share of L at least. What an RSM holds lies off its surface by as much as interpolated depth rounds, some
+// 1e-4 of L, and a VPL behind its own surface would see nothing else.
 const float VISIBILITY_LIFT = 0.01;
+const float VISIBILITY_LEAST_LIFT = 1e-3;
 
-vec3 visibility_origin(VirtualPointLight vpl) {
-    return vpl.position_footprint.xyz + vpl.normal_area.xyz * (VISIBILITY_LIFT * vpl.position_footprint.w);
+vec3 visibility_origin(VirtualPointLight vpl, float scene_length) {
+    float lift = max(VISIBILITY_LIFT * vpl.position_footprint.w, VISIBILITY_LEAST_LIFT * scene_length);
+    return vpl.position_footprint.xyz + vpl.normal_area.xyz * lift;
 }
 
 vec3 visibility_axis(ivec2 texel) {
@@ -42,7 +46,7 @@ float vpl_visibility(
 ) {
     // Made anew for each pair: cheaper than nine more numbers from shared memory.
     mat3 frame = hemisphere_frame(vpl.normal_area.xyz);
-    vec3 to_receiver = (position_world - visibility_origin(vpl)) * frame / scene_length;
+    vec3 to_receiver = (position_world - visibility_origin(vpl, scene_length)) * frame / scene_length;
     vec3 normal = normal_world * frame;
     // The receiver's plane from the VPL, in units of L; a receiver below the horizon gets nothing anyway.
     float plane = dot(to_receiver, normal);

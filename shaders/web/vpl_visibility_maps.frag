@@ -71,6 +71,7 @@ void main() {
         return;
     }
     VirtualPointLight vpl = vpl_at(index / texels);
+    float scene_length = measured_scene_length();
     mat3 frame = hemisphere_frame(vpl.normal_area.xyz);
     ivec2 texel = ivec2(index % VISIBILITY_MAP_SIZE, (index % texels) / VISIBILITY_MAP_SIZE);
     vec3 axis = visibility_axis(texel);
@@ -78,7 +79,7 @@ void main() {
     float nearest = longest;
     uint met = RAY_DONE;
     if (any(greaterThan(vpl.flux.rgb, vec3(0.0)))) {
-        met = nearest_triangle(space_ray(visibility_origin(vpl), direction), nearest);
+        met = nearest_triangle(space_ray(visibility_origin(vpl, scene_length), direction), nearest);
     }
     // What meets nothing ends twice the scene away, at a wall that faces the VPL: no receiver is behind it.
     vec3 normal = -axis;
@@ -90,5 +91,5 @@ void main() {
         normal = (dot(plane, direction) > 0.0 ? -plane : plane) * frame;
     }
     float end = met != RAY_DONE ? nearest : 2.0 * longest;
-    out_texel = visibility_texel(end / measured_scene_length(), normal);
+    out_texel = visibility_texel(end / scene_length, normal);
 }

@@ -8,6 +8,7 @@ from built_scenes import ROOM_LIGHTS, colored_room, room_view
 
 from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
+from renderer.tuned_config import TunedConfig
 from tuner.binned_gather import bin_vpls, gather_binned
 from tuner.losses.relative_squared_error import target_of, weighted_squared_error
 from tuner.search_space import SearchSpace
@@ -16,6 +17,7 @@ from tuner.vpl_gather import FalloffParameters, gather
 
 START = ArtistParameters(intensity=1.4, falloff_footprint=0.7, falloff_transmittance=0.6, vpl_count=256)
 STEP = {"intensity": 0.05, "falloff_footprint": 0.05, "falloff_transmittance": 0.05}
+WITHOUT_MAPS = TunedConfig(visibility="transmittance")
 
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
@@ -26,7 +28,7 @@ def test_gradient_is_the_runtimes_own(gl_context, light, name):
     Central differences of step h err by h²/6 of the third derivative, about 1e-3 here, and float32 pictures
     add 1e-6/h: the cosine between the two derivative pictures is above 0.99999, their sizes agree to 0.3 %.
     """
-    runtime = Runtime(colored_room(), "default", context=gl_context)
+    runtime = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context)
     pictures = []
     for sign in (-1.0, 1.0):
         values = {**START.as_dict(), name: getattr(START, name) + sign * STEP[name]}
@@ -50,7 +52,7 @@ def test_binned_gradient_follows_the_full_gather(gl_context):
 
     Within 2 % of the larger component: binning errs by up to 0.3 % in the picture.
     """
-    captured = Runtime(colored_room(), "default", context=gl_context).capture(room_view("spot"))
+    captured = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context).capture(room_view("spot"))
     receivers, vpls = gather_inputs(captured)
     binned = bin_vpls(receivers, vpls)
     truth = np.asarray(gather(receivers, vpls, FalloffParameters(*map(jnp.float32, (0.9, 0.4, 0.3)))))

@@ -25,6 +25,9 @@ PARAMETERS = (
     ArtistParameters(intensity=3.0, falloff_footprint=0.1, falloff_transmittance=0.0),
 )
 
+# What maps add has twins of its own: test_visibility_twins.py.
+WITHOUT_MAPS = TunedConfig(visibility="transmittance")
+
 
 def relative_rms(value: np.ndarray, expected: np.ndarray) -> float:
     value, expected = value.astype(np.float64), expected.astype(np.float64)
@@ -47,7 +50,7 @@ def twin_error(runtime: Runtime, view: View, parameters: ArtistParameters) -> fl
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_twins_agree_in_the_room(gl_context, light, parameters):
     """Relative RMSE below 1e-4: both sides work in float32, in different coordinates."""
-    runtime = Runtime(colored_room(), TunedConfig(parameters), context=gl_context)
+    runtime = Runtime(colored_room(), TunedConfig(parameters, visibility="transmittance"), context=gl_context)
     assert twin_error(runtime, room_view(light), parameters) < 1e-4
 
 
@@ -55,7 +58,7 @@ def scene_twin_error(path, gl_context) -> float:
     scene = read_scene(path)
     camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
     view = View(path.stem, "fitted", (96, 72), camera, lights)
-    runtime = Runtime(scene, "default", context=gl_context)
+    runtime = Runtime(scene, WITHOUT_MAPS, context=gl_context)
     return max(twin_error(runtime, view, parameters) for parameters in PARAMETERS)
 
 
@@ -74,7 +77,7 @@ def test_twins_agree_on_scenes_of_others(gl_context, scenes_folder, name):
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_factored_gather_equals_its_definition(gl_context, light):
     """Axis by axis against pair by pair, 1e-4 relative RMSE: float32 in another order."""
-    captured = Runtime(colored_room(), "default", context=gl_context).capture(room_view(light, (32, 24)))
+    captured = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context).capture(room_view(light, (32, 24)))
     receivers, vpls = gather_inputs(captured)
     for parameters in map(FalloffParameters.of, PARAMETERS):
         pairwise = np.asarray(gather_pairwise(receivers, vpls, parameters))
@@ -84,7 +87,7 @@ def test_factored_gather_equals_its_definition(gl_context, light):
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_binned_gather_is_close(gl_context, light):
     """Over the range that fits end in, interpolation between nodes costs less than 0.6 % relative RMSE."""
-    captured = Runtime(colored_room(), "default", context=gl_context).capture(room_view(light))
+    captured = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context).capture(room_view(light))
     receivers, vpls = gather_inputs(captured)
     binned = bin_vpls(receivers, vpls)
     for alpha in (0.05, 0.5, 1.0, 3.0):
@@ -96,7 +99,7 @@ def test_binned_gather_is_close(gl_context, light):
 
 def test_hidden_vpls_give_nothing(gl_context):
     """A visibility mask takes out exactly the pairs it names, in both forms of the gather."""
-    captured = Runtime(colored_room(), "default", context=gl_context).capture(room_view("spot", (32, 24)))
+    captured = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context).capture(room_view("spot", (32, 24)))
     receivers, vpls = gather_inputs(captured)
     parameters = FalloffParameters.of(ArtistParameters())
     shape = (len(receivers.position), len(vpls.position))

@@ -7,6 +7,7 @@ from built_scenes import colored_room, room_view
 
 from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
+from renderer.tuned_config import TunedConfig
 from tuner.binned_gather import bin_vpls, gather_binned
 from tuner.captured_view import CapturedView
 from tuner.fit_falloff import fit_falloff
@@ -17,6 +18,8 @@ from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_gather import FalloffParameters
 
 PLANTED = ArtistParameters(intensity=1.35, falloff_footprint=0.8, falloff_transmittance=0.7, vpl_count=256)
+# Maps have parameters of their own, planted in test_planted_visibility.py.
+WITHOUT_MAPS = TunedConfig(visibility="transmittance")
 
 
 def drawn_by_the_runtime(runtime: Runtime, light: str, parameters: ArtistParameters) -> CapturedView:
@@ -40,7 +43,7 @@ def drawn_by_the_runtime(runtime: Runtime, light: str, parameters: ArtistParamet
 
 @pytest.fixture(scope="module")
 def planted_views(gl_context):
-    runtime = Runtime(colored_room(), "default", context=gl_context)
+    runtime = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context)
     return tuple(drawn_by_the_runtime(runtime, light, PLANTED) for light in ("spot", "point"))
 
 
@@ -64,7 +67,7 @@ def test_a_fit_never_ends_above_its_start(planted_views):
 
 def test_nothing_lit_is_a_status(gl_context):
     """A view without light is no error: the start is kept, and the status says why."""
-    runtime = Runtime(colored_room(), "default", context=gl_context)
+    runtime = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context)
     view = drawn_by_the_runtime(runtime, None, PLANTED)
     tuned, result = fit_falloff((view,), PLANTED)
     assert result.status is FitStatus.NOTHING_LIT

@@ -35,7 +35,7 @@ class Drawn:
     def __init__(self, context, scene: Scene, view: View, rsm_resolution: int = 256):
         self.scene, self.view = scene, view
         self._runtime = Runtime(
-            scene, TunedConfig(PARAMETERS), context=context, rsm_resolution=rsm_resolution
+            scene, TunedConfig(PARAMETERS, visibility="none"), context=context, rsm_resolution=rsm_resolution
         )
         self.records = frame_light_records(
             self._runtime.scene_buffers, view, self._runtime._snapped_cells(view)

@@ -17,6 +17,7 @@ PASSES = {
     "light_pre_pass",
     "reflective_shadow_map",
     "virtual_point_lights",
+    "vpl_visibility_maps",
     "direct_light",
     "vpl_gather",
     "interleaved_filter",

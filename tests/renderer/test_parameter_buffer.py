@@ -9,7 +9,7 @@ from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
 from renderer.parameter_buffer import ParameterBuffer
 
 # Values that float32 holds exactly, none of them a default.
-VALUES = {spec.name: spec.high if spec.whole_number else 0.375 for spec in ARTIST_PARAMETERS}
+VALUES = {spec.name: spec.high if spec.whole_number else 0.0625 for spec in ARTIST_PARAMETERS}
 
 
 @pytest.fixture

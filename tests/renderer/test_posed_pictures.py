@@ -11,8 +11,11 @@ from renderer.animation import AnimationPlayer
 from renderer.runtime import Runtime
 from renderer.scene import Camera, Instance, Mesh, look_at
 from renderer.scene_file import read_scene
+from renderer.tuned_config import TunedConfig
 from renderer.views import View
 
+# Visibility maps see a skin as rigid pieces, see renderer/ray_hierarchy.py.
+WITHOUT_MAPS = TunedConfig(visibility="none")
 BUFFERS = ("position_world", "normal_world", "direct_irradiance", "indirect_irradiance")
 
 
@@ -61,7 +64,7 @@ def blended_mesh(mesh: Mesh, joint_matrices) -> Mesh:
 def test_skins_bend_on_the_gpu_as_on_paper(gl_context, light):
     """Camera and light both see the bent board: depth and VPLs are those of the board bent in numpy."""
     scene = bent_board()
-    runtime = Runtime(scene, context=gl_context)
+    runtime = Runtime(scene, WITHOUT_MAPS, context=gl_context)
     pose = AnimationPlayer(scene).pose_at(0.4)
     runtime.scene_buffers.set_pose(pose.transforms, pose.joint_matrices)
     baked = dataclasses.replace(
@@ -73,7 +76,7 @@ def test_skins_bend_on_the_gpu_as_on_paper(gl_context, light):
         animation=None,
     )
     view = room_view(light)
-    bent, expected = runtime.capture(view), Runtime(baked, context=gl_context).capture(view)
+    bent, expected = runtime.capture(view), Runtime(baked, WITHOUT_MAPS, context=gl_context).capture(view)
     changed = np.abs(bent.depth - Runtime(colored_room(), context=gl_context).capture(view).depth) > 1e-3
     assert changed.mean() > 0.01, "the board did not move"
     # A silhouette may fall on the other side of a pixel's centre.
@@ -116,7 +119,7 @@ def test_skinned_corpus_at_rest_is_drawn_as_it_was_baked(corpora_folder, gl_cont
         middle, reach = (low + high) / 2.0, np.linalg.norm(high - low)
         camera = Camera(look_at(middle + np.array([0.3, 0.2, 1.6]) * reach, middle), 0.8)
         view = View("skin", "fitted", (48, 48), camera, (ROOM_LIGHTS["directional"],))
-        drawn, expected = (Runtime(s, context=gl_context).capture(view) for s in (scene, baked))
+        drawn, expected = (Runtime(s, WITHOUT_MAPS, context=gl_context).capture(view) for s in (scene, baked))
         assert expected.valid.any(), path.name
         assert (drawn.valid == expected.valid).mean() > 0.998, path.name
         both = drawn.valid & expected.valid

@@ -114,3 +114,14 @@ def test_fit_without_json_ends_with_table_picture_and_next_command(fitted, docum
     assert f"picture: {fitted / 'again' / 'comparison.png'}" in shown
     assert (fitted / "again" / "comparison.png").exists()
     assert f"next:    vpltune render {SCENE} --config {fitted / 'again' / 'tuned.json'}" in shown
+
+
+def test_without_visibility_transmittance_is_left_alone(fitted, capfd):
+    """The runtime does not look at it then: to move it would pay for leaks with what is not drawn."""
+    arguments = ["--views", "1", "--size", "64x48", "--visibility", "none", "--json"]
+    assert run(["fit", str(SCENE), "-o", str(fitted / "none"), *arguments]) == 0
+    document = json.loads(capfd.readouterr().out)
+    assert document["parameters"]["falloff_transmittance"] == 0.0
+    assert "falloff_transmittance" not in document["uncertainty"]
+    metrics = document["metrics"]["fitted"]
+    assert metrics["tuned"]["relmse"] < metrics["default"]["relmse"]

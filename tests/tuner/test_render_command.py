@@ -167,7 +167,7 @@ def test_an_output_in_the_way_is_refused_after_drawing(views_path, tmp_path, cap
 
 
 def test_no_opengl_is_exit_code_3(views_path, tmp_path, monkeypatch, capfd):
-    def refuse(self, *arguments):
+    def refuse(self, *arguments, **options):
         raise MachineError("no headless OpenGL context; run: vpltune doctor")
 
     monkeypatch.setattr(Runtime, "__init__", refuse)

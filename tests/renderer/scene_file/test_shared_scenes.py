@@ -40,8 +40,8 @@ def test_real_scenes_are_read_whole(scenes_folder, path, triangles, diagonal, te
     # The README prints three digits.
     assert np.linalg.norm(high - low) == pytest.approx(diagonal, rel=5e-3)
     assert (len(scene.textures), len(scene.lights), len(scene.cameras)) == (textures, lights, cameras)
-    # Measured at most 0.9 s on a busy two-core machine.
-    assert seconds < 5.0
+    # Measured at most 0.9 s; the bound is for what grows with the square of a scene.
+    assert seconds < 30.0
     for mesh in scene.meshes:
         np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1.0, atol=1e-6)
         assert mesh.triangles.min() >= 0

@@ -1,14 +1,18 @@
 """Side by side: the reference, default, tuned and ceiling, under one exposure for each row."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float32, UInt8
 from PIL import Image, ImageDraw, ImageFont
 
 from renderer.image_file import write_png
 from renderer.passes.tone_mapping import EXPOSURE_KEY
 from renderer.runtime import Runtime
+from tuner.captured_view import CapturedView
 from tuner.evaluate import VARIANTS, EvaluatedView
+from tuner.view_metrics import ViewMetrics
 
 _MARGIN = 8
 _CAPTION = 22
@@ -31,18 +35,32 @@ def write_comparison(
     write_png(path, np.concatenate(rows))
 
 
-def _row(runtime: Runtime, evaluated: EvaluatedView, panel_height: int) -> np.ndarray:
-    view = evaluated.view
+def picture_row(
+    runtime: Runtime,
+    view: CapturedView,
+    irradiance: Mapping[str, Float32[np.ndarray, "height width 3"]],
+    panel_height: int,
+) -> UInt8[np.ndarray, "rows columns 3"]:
+    """The reference, and beside it pictures of the same view with other indirect irradiance, by caption."""
     reference = view.reference_radiance()
     level = float((reference[view.valid] @ _LUMINANCE).mean()) if view.valid.any() else 0.0
     exposure = EXPOSURE_KEY / level if level > 0.0 else 1.0
     panels = [_panel(runtime, reference, exposure, panel_height, f"{view.view.name}: reference")]
-    for variant in VARIANTS:
-        picture = view.runtime_radiance(evaluated.irradiance[variant])
-        metrics = evaluated.metrics[variant]
-        caption = f"{variant}: relMSE {metrics.relmse:.3g}, energy {metrics.energy_ratio:.2f}"
-        panels.append(_panel(runtime, picture, exposure, panel_height, caption))
+    for caption, picture in irradiance.items():
+        panels.append(_panel(runtime, view.runtime_radiance(picture), exposure, panel_height, caption))
     return np.concatenate(panels, axis=1)
+
+
+def captioned(name: str, metrics: ViewMetrics) -> str:
+    """A panel's caption: whose picture it is, and how far from the reference."""
+    return f"{name}: relMSE {metrics.relmse:.3g}, energy {metrics.energy_ratio:.2f}"
+
+
+def _row(runtime: Runtime, evaluated: EvaluatedView, panel_height: int) -> np.ndarray:
+    pictures = {
+        captioned(variant, evaluated.metrics[variant]): evaluated.irradiance[variant] for variant in VARIANTS
+    }
+    return picture_row(runtime, evaluated.view, pictures, panel_height)
 
 
 def _panel(

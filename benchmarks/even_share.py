@@ -6,17 +6,18 @@ from statistics import fmean, geometric_mean
 from benchmarks.row import Row
 from benchmarks.scene_library import present_scenes
 from renderer.artist_parameters import ArtistParameters
+from renderer.runtime import Runtime
 from renderer.tuned_config import TunedConfig
-from tuner.captured_view import CapturedView
-from tuner.evaluate import surrogate_irradiance
+from tuner.captured_view import CapturedView, runtime_irradiance
 from tuner.fit_falloff import fit_falloff
 from tuner.prepare_scene import SceneOptions, Stopwatch, prepare_scene
 from tuner.view_metrics import ViewMetrics, mean_metrics, view_metrics
 
-SHARES = (0.0, 1.0, 3.0, 10.0)
+SHARES = (0.0, 3.0, 10.0, 30.0, 100.0)
 SCENES = (
     "bevy-cornellbox",
     "cornell-box",
+    "cube2-steelribs",
     "gallery",
     "godot-living-room",
     "godot-zdm2",
@@ -33,9 +34,10 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
         progress("even_share", index / len(present))
         prepared = prepare_scene(path, SceneOptions(), TunedConfig(), Stopwatch(), lambda *_: None)
         fitted = tuple(view for view in prepared.views if view.view.split == "fitted")
-        default = _mean(prepared.views, ArtistParameters())
+        default = _mean(prepared.runtime, prepared.views, ArtistParameters())
         for share in SHARES:
-            tuned = _mean(prepared.views, fit_falloff(fitted, ArtistParameters(), even_share=share)[0])
+            parameters, _ = fit_falloff(fitted, ArtistParameters(), even_share=share)
+            tuned = _mean(prepared.runtime, prepared.views, parameters)
             ratios[share].append(
                 (tuned.relmse / default.relmse, tuned.flip / default.flip, abs(tuned.energy_ratio - 1.0))
             )
@@ -51,10 +53,10 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
     ]
 
 
-def _mean(views: tuple[CapturedView, ...], parameters: ArtistParameters) -> ViewMetrics:
+def _mean(runtime: Runtime, views: tuple[CapturedView, ...], parameters: ArtistParameters) -> ViewMetrics:
     measured = []
     for view in views:
-        irradiance = surrogate_irradiance(view, parameters)
+        irradiance = runtime_irradiance(runtime, parameters, view)
         measured.append(
             view_metrics(
                 irradiance,

@@ -22,9 +22,9 @@ DARK_SHARE = 0.01
 """Of the squared mean, added to r²: a black pixel must not weigh infinitely."""
 
 EVEN_SHARE = 10.0
-"""On eight scenes with visibility maps, whose leaks are few and dark: 0 leaves 0.84 of the default's relMSE with
-1.8 times its HDR-FLIP and an energy off by 11 %; 3 leaves 0.90 with 1.3 times and 3 %; 10 leaves 0.93 with 1.1
-times and 2 %; 100 leaves 0.96 with 1.07 times and 1 % (geometric means; `vpltune bench even_share`)."""
+"""On eight scenes with visibility maps, whose leaks are few and dark: 0 leaves 0.84 of the default's relMSE
+with 1.8 times its HDR-FLIP and an energy off by 11 %; 3 leaves 0.90 with 1.3 times and 3 %; 10 leaves 0.93
+with 1.1 times and 2 %; 100 leaves 0.96 with 1.07 times and 1 % (`vpltune bench even_share`)."""
 
 
 @jax.tree_util.register_dataclass

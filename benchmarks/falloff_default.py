@@ -14,6 +14,7 @@ from renderer.artist_parameters import ArtistParameters
 from renderer.gpu_context import create_context
 from renderer.runtime import Runtime
 from renderer.scene_file import read_scene
+from renderer.tuned_config import TunedConfig
 from renderer.views import View
 from tuner.view_metrics import energy_ratio, relmse
 
@@ -32,7 +33,7 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
         progress("falloff_default", index / len(OWN_SCENES))
         scene = read_scene(path)
         view = View(path.stem, "fitted", SIZE, scene.cameras[0], scene.lights)
-        runtime = Runtime(scene, "default", context=context)
+        runtime = Runtime(scene, TunedConfig(visibility="none"), context=context)
         converged = _irradiance(runtime, view, CONVERGED, (0.0, 0.0))
         for alpha in ALPHAS:
             parameters = ArtistParameters(vpl_count=VPLS, falloff_footprint=alpha)

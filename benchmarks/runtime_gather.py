@@ -80,7 +80,8 @@ class _BenchmarkScene:
 
     def drawn(self, size: tuple[int, int], options: RuntimeOptions) -> "_Drawn":
         """A frame that has been drawn once, so that shaders are compiled and buffers filled."""
-        runtime = Runtime(self._scene, TunedConfig(_PARAMETERS), options, context=self._context)
+        config = TunedConfig(_PARAMETERS, visibility="none")  # `vpltune bench visibility` has the maps
+        runtime = Runtime(self._scene, config, options, context=self._context)
         view = View("gather", "fitted", size, self._camera, self._lights)
         frame = runtime._draw(view)
         self._context.finish()

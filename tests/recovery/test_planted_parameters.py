@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from built_scenes import colored_room, room_view
+from own_reference import own_reference
 
 from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
@@ -27,18 +28,7 @@ def drawn_by_the_runtime(runtime: Runtime, light: str, parameters: ArtistParamet
     view = room_view(light)
     runtime.parameters = parameters
     captured = runtime.capture(view)
-    picture = captured.indirect_irradiance
-    reference = ReferenceView(
-        irradiance_a=picture,
-        irradiance_b=picture,
-        direct_irradiance=captured.direct_irradiance,
-        albedo=captured.albedo,
-        position_world=captured.position_world.astype(np.float64),
-        normal_world=captured.normal_world,
-        valid=captured.valid,
-        samples=1,
-    )
-    return CapturedView(view, reference, captured)
+    return CapturedView(view, own_reference(captured), captured)
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from built_scenes import colored_room, room_view
+from own_reference import own_reference
 
 from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
@@ -14,7 +15,6 @@ from renderer.tuned_config import TunedConfig
 from tuner.captured_view import CapturedView
 from tuner.fit_visibility import SPACE, fit_visibility, overlap_nodes, reduce_visibility, residuals
 from tuner.losses.relative_squared_error import target_of, weighted_squared_error
-from tuner.reference.reference_view import ReferenceView
 from tuner.virtual_point_lights import Receivers, VirtualPointLights, gather_inputs
 from tuner.vpl_gather import FalloffParameters, gather
 from tuner.vpl_visibility import VisibilityParameters, map_texels, seen_share, surface_overlap
@@ -29,17 +29,7 @@ def drawn_by_the_runtime(gl_context, light: str, parameters: ArtistParameters) -
     runtime = Runtime(colored_room(), TunedConfig(parameters, visibility="maps"), context=gl_context)
     view = room_view(light)
     captured = runtime.capture(view)
-    reference = ReferenceView(
-        irradiance_a=captured.indirect_irradiance,
-        irradiance_b=captured.indirect_irradiance,
-        direct_irradiance=captured.direct_irradiance,
-        albedo=captured.albedo,
-        position_world=captured.position_world.astype(np.float64),
-        normal_world=captured.normal_world,
-        valid=captured.valid,
-        samples=1,
-    )
-    return CapturedView(view, reference, captured)
+    return CapturedView(view, own_reference(captured), captured)
 
 
 def test_recovery(gl_context):

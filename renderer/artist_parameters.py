@@ -183,7 +183,7 @@ ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
     ),
     ParameterSpec(
         name="screen_space_strength",
-        symbol="σ",
+        symbol="s",
         default=0.0,
         low=0.0,
         high=2.0,

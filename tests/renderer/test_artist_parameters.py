@@ -100,3 +100,8 @@ def test_a_row_is_found_by_its_name():
     assert parameter_spec("falloff_footprint").symbol == "α"
     with pytest.raises(KeyError):
         parameter_spec("radius")
+
+
+def test_no_two_parameters_share_a_symbol():
+    symbols = [spec.symbol for spec in ARTIST_PARAMETERS]
+    assert len(set(symbols)) == len(symbols)

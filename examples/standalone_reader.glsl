@@ -88,15 +88,11 @@ struct Face {
     vec4 origin;        // of its tile in the atlas
 };
 layout(std430, binding = 1) readonly buffer Faces { Face faces[]; };
-layout(std430, binding = 2) readonly buffer Vpls { vec4 vpls[]; };  // position, footprint; normal; flux
 layout(binding = 0) uniform sampler2D positions;
 layout(binding = 1) uniform sampler2D normals;
 layout(binding = 2) uniform sampler2D albedos;
 layout(binding = 3) uniform sampler2D light_depths;
 layout(rgba32f, binding = 0) writeonly uniform image2D radiance;
-uniform float intensity, falloff_footprint, falloff_transmittance;  // the tuned k, α and κ
-uniform float scene_length;
-uniform int size;
 
 // Percentage-closer filtering of the four nearest texels, biased by texels.
 float shadow(int light, vec3 position, vec3 normal, vec3 towards) {
@@ -110,16 +106,16 @@ float shadow(int light, vec3 position, vec3 normal, vec3 towards) {
     bool flat_face = face.extent_light.w > 0.0;
     vec2 extent = face.extent_light.xy;
     float depth = -(face.to_face * vec4(position, 1.0)).z;
-    float texel = max(extent.x, extent.y) * 2.0 / float(size) * (flat_face ? 1.0 : depth);
+    float texel = max(extent.x, extent.y) * 2.0 / float(face_size) * (flat_face ? 1.0 : depth);
     float cosine = clamp(dot(normal, towards), 0.0, 1.0);
     vec3 moved = position + normal * (1.5 * sqrt(1.0 - cosine * cosine) * texel);
     vec3 seen = (face.to_face * vec4(moved, 1.0)).xyz;
-    vec2 place = (seen.xy / (extent * (flat_face ? 1.0 : -seen.z)) * 0.5 + 0.5) * float(size) - 0.5;
+    vec2 place = (seen.xy / (extent * (flat_face ? 1.0 : -seen.z)) * 0.5 + 0.5) * float(face_size) - 0.5;
     float lit = 0.0;
     for (int i = 0; i < 4; ++i) {
         ivec2 at = ivec2(floor(place)) + ivec2(i & 1, i >> 1);
         vec2 weight = 1.0 - abs(place - vec2(at));
-        at = clamp(at, ivec2(0), ivec2(size - 1)) + ivec2(face.origin.xy);
+        at = clamp(at, ivec2(0), ivec2(face_size - 1)) + ivec2(face.origin.xy);
         float stored = texelFetch(light_depths, at, 0).r;
         lit += stored > 0.0 && stored < -seen.z - 0.5 * texel ? 0.0 : weight.x * weight.y;
     }
@@ -135,7 +131,8 @@ void main() {
         float dd = max(dot(d, d), 1e-30);
         float footprint = falloff_footprint * vpls[i].w;
         float form = max(dot(n, d), 0.0) * max(-dot(vpls[i + 1].xyz, d), 0.0) / dd / (dd + footprint * footprint);
-        irradiance += vpls[i + 2].rgb * (intensity / PI * form * exp(-falloff_transmittance * sqrt(dd) / scene_length));
+        form *= exp(-falloff_transmittance * sqrt(dd) / scene_length);
+        if (form > 0.0) { irradiance += vpls[i + 2].rgb * (intensity / PI * form * visibility(i, p, n)); }
     }
     for (int i = 0; i < lights.length(); ++i) {
         vec3 towards;

@@ -1,6 +1,6 @@
 """Draws a scene that VPLtune exported, without VPLtune: python standalone_reader.py BUNDLE OUT.png
 
-BUNDLE: `vpltune export tuned.json --to bundle --scene scene.glb -o BUNDLE`. Shaders: standalone_reader.glsl.
+BUNDLE: `vpltune export tuned.json --to bundle --scene scene.glb -o BUNDLE`. Shaders: standalone_*.glsl.
 """
 
 import json
@@ -11,21 +11,24 @@ import moderngl
 import numpy as np
 from PIL import Image
 
-GLSL = "#version 430\n#define STAGE\n" + Path(__file__).with_suffix(".glsl").read_text(encoding="utf-8")
+
+def shader(stage, numbers=()):
+    defines = [f"#define {name} {value}" for name, value in [(stage, 1), *numbers]]
+    files = [Path(__file__).with_name(f"standalone_{part}.glsl") for part in ("visibility", "reader")]
+    return "\n".join(["#version 430", *defines, *(file.read_text(encoding="utf-8") for file in files)])
 
 
-class Surfaces:
-    """The triangles and textures of a bundle."""
-
+class Surfaces:  # the triangles and textures of a bundle
     def __init__(self, context, bundle, binary):
         self.context, self.bundle = context, bundle
-        self.program = context.program(*(GLSL.replace("STAGE", name, 1) for name in ("VERTEX", "FRAGMENT")))
-        part = {name: (a["offset"], a["offset"] + a["bytes"]) for name, a in bundle["arrays"].items()}
-        self.part = {name: context.buffer(binary[slice(*place)]) for name, place in part.items()}
+        self.program = context.program(shader("VERTEX"), shader("FRAGMENT"))
+        arrays = bundle["arrays"].items()
+        self.part = {name: context.buffer(binary[a["offset"] :][: a["bytes"]]) for name, a in arrays}
         layouts = {"positions": "3f", "normals": "3f", "uv": "2f", "base_colors": "3f"}
         content = [(self.part[name], layout, f"in_{name}") for name, layout in layouts.items()]
         self.vertices = context.vertex_array(self.program, content, index_buffer=self.part["triangles"])
-        self.part["lights"].bind_to_storage_buffer(0)
+        for binding, name in enumerate(("lights", "faces", "positions", "triangles")):
+            self.part[name].bind_to_storage_buffer(binding)
         self.textures = []
         for entry in bundle["textures"]:
             texels = binary[entry["offset"] :][: entry["bytes"]]
@@ -53,7 +56,7 @@ class Surfaces:
         return targets
 
 
-def numbers(texture):  # [height, width, 4], bottom row first
+def pixels(texture):  # [height, width, 4], bottom row first
     return np.frombuffer(texture.read(), "f4").reshape(texture.height, texture.width, 4)
 
 
@@ -62,7 +65,7 @@ def light_maps(surfaces, rsm):  # an atlas of position, depth, plane's normal, a
     for face in rsm["faces"]:
         to_world, (row, column) = np.array(face["light_to_world"]), face["origin"]
         maps = surfaces.seen((size, size), to_world, face["extent"], face["light"], face["orthographic"])
-        atlas[row : row + size, column : column + size] = np.dstack([numbers(texture) for texture in maps])
+        atlas[row : row + size, column : column + size] = np.dstack([pixels(texture) for texture in maps])
     return atlas
 
 
@@ -104,8 +107,8 @@ def virtual_point_lights(atlas, bundle):
 
 def displayed(radiance, key):
     """Exposed to a mean luminance of `key`, Khronos PBR Neutral tone curve, sRGB; top row first."""
-    color = radiance[::-1, :, :3].astype(float)
-    color *= key * radiance[..., 3].sum() / (color @ [0.2126, 0.7152, 0.0722]).sum()
+    exposure = key * radiance[..., 3].sum() / (radiance[..., :3] @ [0.2126, 0.7152, 0.0722]).sum()
+    color = exposure * radiance[::-1, :, :3]
     low = color.min(-1, keepdims=True)
     color -= np.where(low < 0.08, low - 6.25 * low**2, 0.04)
     peak = color.max(-1, keepdims=True)
@@ -113,36 +116,33 @@ def displayed(radiance, key):
     white = 1 - 1 / (0.15 * (peak - shoulder) + 1)
     bent = color * shoulder / np.maximum(peak, 1e-9) * (1 - white) + shoulder * white
     color = np.clip(np.where(peak < 0.76, color, bent), 0, 1)
-    encoded = np.where(color > 0.0031308, 1.055 * np.maximum(color, 1e-9) ** (1 / 2.4) - 0.055, 12.92 * color)
-    return np.round(255 * encoded).astype("u1")
+    curve = 1.055 * color ** (1 / 2.4) - 0.055
+    return np.uint8(255 * np.where(color > 0.0031308, curve, 12.92 * color) + 0.5)
 
 
 def main(folder, output):
     bundle = json.loads((Path(folder) / "bundle.json").read_text(encoding="utf-8"))
-    parameters, view, size = bundle["config"]["parameters"], bundle["view"], tuple(bundle["view"]["size"])
-    parameters["falloff_transmittance"] *= bundle["config"]["visibility"] != "none"
-    if bundle["config"]["visibility"] == "maps":
-        print("visibility maps are not drawn here: VPLs shine through walls", file=sys.stderr)
+    view, rsm, numbers = bundle["view"], bundle["rsm"], bundle["config"]["parameters"]
+    size, camera, map_size = view["size"], np.array(view["camera_to_world"]), bundle["visibility_map_size"]
     context = moderngl.create_standalone_context(require=430, backend="egl")
     surfaces = Surfaces(context, bundle, (Path(folder) / "bundle.bin").read_bytes())
-    atlas = light_maps(surfaces, bundle["rsm"])
+    atlas = light_maps(surfaces, rsm)
     vpls, length = virtual_point_lights(atlas, bundle)
-    targets = surfaces.seen(size, np.array(view["camera_to_world"]), view["tan_half_fov"])
+    context.buffer(vpls).bind_to_storage_buffer(4)
+    context.buffer(reserve=16 * len(vpls) * max(map_size, 1) ** 2).bind_to_storage_buffer(5)
+    numbers["falloff_transmittance"] *= bundle["config"]["visibility"] != "none"
+    numbers |= {"scene_length": length, "map_size": map_size, "face_size": rsm["resolution"]}
+    if map_size > 0:
+        context.compute_shader(shader("CASTING", numbers.items())).run(len(vpls))
+        context.memory_barrier()
     depths = context.texture(atlas.shape[1::-1], 1, atlas[..., 3].astype("f4").tobytes(), dtype="f4")
-    lighting, radiance = (
-        context.compute_shader(GLSL.replace("STAGE", "LIGHTING", 1)),
-        context.texture(size, 4, dtype="f4"),
-    )
-    for unit, texture in enumerate([*targets, depths]):
+    for unit, texture in enumerate([*surfaces.seen(size, camera, view["tan_half_fov"]), depths]):
         texture.use(unit)
-    for binding, rows in ((1, surfaces.part["faces"]), (2, context.buffer(vpls))):
-        rows.bind_to_storage_buffer(binding)
-    for name in ("intensity", "falloff_footprint", "falloff_transmittance"):
-        lighting[name] = parameters[name]
-    lighting["scene_length"], lighting["size"] = length, bundle["rsm"]["resolution"]
+    radiance = context.texture(size, 4, dtype="f4")
     radiance.bind_to_image(0)
-    lighting.run(-(-size[0] // 8), -(-size[1] // 8))
-    Image.fromarray(displayed(numbers(radiance), view["exposure_key"])).save(output)
+    context.compute_shader(shader("LIGHTING", numbers.items())).run(-(-size[0] // 8), -(-size[1] // 8))
+    context.memory_barrier()
+    Image.fromarray(displayed(pixels(radiance), view["exposure_key"])).save(output)
 
 
 if __name__ == "__main__":

@@ -84,7 +84,7 @@ def scene_bundle(
             "faces": _faces(records, resolution),
         },
         "point_table": {"kind": "r2", "steps": list(R2_STEPS)},
-        "visibility_map_size": options.visibility_map_size,
+        "visibility_map_size": options.visibility_map_size if config.visibility == "maps" else 0,
         "draws": draws,
         "textures": [_texture(texture, binary) for texture in (*scene.textures, WHITE)],
         "arrays": binary.arrays,
@@ -92,13 +92,9 @@ def scene_bundle(
     return SceneBundle(document, bytes(binary.content))
 
 
-def left_out(config: TunedConfig, *, draws_maps: bool) -> tuple[str, ...]:
+def left_out(config: TunedConfig) -> tuple[str, ...]:
     """What of a config is not drawn outside the runtime, a sentence each."""
     sentences = []
-    if config.visibility == "maps" and not draws_maps:
-        sentences.append(
-            "Visibility maps are not drawn by the stand-alone reader: light passes through walls"
-        )
     if config.parameters.screen_space_strength > 0.0:
         sentences.append("The screen-space near field is drawn by the runtime alone")
     if config.parameters.density_importance > 0.0:

@@ -75,9 +75,7 @@ def picture_of(page):
 
 
 def page_text(scene, view, config=CONFIG):
-    return web_page(
-        scene_bundle(scene, view, config, rsm_resolution=RESOLUTION), left_out(config, draws_maps=True)
-    )
+    return web_page(scene_bundle(scene, view, config, rsm_resolution=RESOLUTION), left_out(config))
 
 
 def assert_same(picture, ours):

@@ -90,7 +90,6 @@ def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
 
 
 def _defines(document: dict[str, Any]) -> dict[str, Define]:
-    maps = document["config"]["visibility"] == "maps"
     return {
         "LIGHT_COUNT": len(document["lights"]),
         "RSM_FACE_COUNT": len(document["rsm"]["faces"]),
@@ -98,7 +97,7 @@ def _defines(document: dict[str, Any]) -> dict[str, Define]:
         "RSM_FILTERING": document["rsm"]["filtering"],
         "VPL_COLUMNS": VPL_COLUMNS,
         "DATA_COLUMNS": DATA_COLUMNS,
-        "VISIBILITY_MAP_SIZE": document["visibility_map_size"] if maps else 0,
+        "VISIBILITY_MAP_SIZE": document["visibility_map_size"],
         "RAY_COUNT_BITS": COUNT_BITS,
         "RAY_STACK_SIZE": _TREE_DEPTH,
         "EXPOSURE_KEY": EXPOSURE_KEY,

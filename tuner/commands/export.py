@@ -171,7 +171,7 @@ def _write_with_view(config: "TunedConfig", to: Form, output: Path, bundle: "Sce
     from renderer.scene_bundle import left_out, write_bundle
     from renderer.web_page import web_page
 
-    unseen = left_out(config, draws_maps=to == "web")
+    unseen = left_out(config)
     warn(unseen)
     if to == "bundle":
         write_bundle(output, bundle)

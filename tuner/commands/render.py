@@ -58,8 +58,15 @@ def render(
         int, typer.Option(metavar="1|2|4|8", help="Blocks of NxN pixels share the VPLs out: faster above 1.")
     ] = 1,
     map_size: Annotated[
-        int, typer.Option(metavar="TEXELS", min=4, max=64, help="Along the side of a VPL's visibility map.")
-    ] = 16,
+        int | None,
+        typer.Option(
+            metavar="TEXELS",
+            min=4,
+            max=64,
+            help="Along the side of a VPL's visibility map. [24]",
+            show_default=False,
+        ),
+    ] = None,
     rsm_resolution: Annotated[
         int | None,
         typer.Option(
@@ -151,7 +158,7 @@ def render(
         loaded, drawn = scaled(loaded, factor), scaled_view(drawn, factor)
     options = RuntimeOptions(
         interleave=interleave,
-        visibility_map_size=map_size,
+        visibility_map_size=map_size or RuntimeOptions.visibility_map_size,
         # A clip is eased over a quarter of a second; a still takes what it asks for.
         adaptation_frames=0.0 if frames is None else fps / 4.0,
     )

@@ -8,7 +8,7 @@ import re
 
 import numpy as np
 import pytest
-from built_scenes import ROOM_LIGHTS, room_view
+from built_scenes import ROOM_LIGHTS, colored_room, room_view
 from headless_chromium import headless_chromium
 from PIL import Image
 from test_standalone_reader import CONFIG, SCENES, textured_room
@@ -61,10 +61,10 @@ def opened(browser, tmp_path):
 
 
 def web_view(light, size=(96, 72)):
-    """A view of the room in which no edge runs along a row of pixel centres."""
+    """A view of the room in which no edge runs along a row or a column of pixel centres."""
     view = room_view(light, size)
     to_world = view.camera.to_world.copy()
-    to_world[:3, 3] += 0.0137, 0.0071, 0.0
+    to_world[:3, 3] += 0.03, 0.0071, 0.0
     return dataclasses.replace(view, camera=Camera(to_world, view.camera.yfov))
 
 
@@ -78,31 +78,39 @@ def page_text(scene, view, config=CONFIG):
     return web_page(scene_bundle(scene, view, config, rsm_resolution=RESOLUTION), left_out(config))
 
 
-def assert_same(picture, ours):
-    """To 3/255 in all but one pixel in 200; where a surface or a shadow ends, of some pixel beside.
+def assert_same(picture, runtime, view, exposure=None, *, textured=False):
+    """To 3/255, where walls have textures to 8/255, in all but one pixel in a thousand.
 
-    Rasterisers snap corners to grids of their own, and differ in which side an edge pixel shows.
+    OpenGL leaves to the driver how textures are filtered at a slant: without anisotropy these walls agree to
+    2/255. And rasterisers round corners to grids of their own, SwiftShader to 1/16 of a pixel: an edge
+    that passes a pixel's centre closer than that may leave it on either side.
     """
+    ours = runtime.render(view, exposure=exposure).astype(int)
     assert np.ptp(ours) > 100
-    ours = ours.astype(int)
-    padded = np.pad(ours, ((1, 1), (1, 1), (0, 0)), mode="edge")
-    height, width, _ = ours.shape
-    beside = np.stack([padded[y : y + height, x : x + width] for y in range(3) for x in range(3)])
-    outside = np.maximum(beside.min(axis=0) - picture, picture - beside.max(axis=0)).max(axis=-1)
-    assert (outside > 3).mean() < 0.005, f"{(outside > 3).mean():.2%} differ, by up to {outside.max()}"
+    side_walls = np.abs(runtime.render(view, "normal")[..., 0]) > 0.9
     difference = np.abs(picture - ours).max(axis=-1)
-    assert (difference > 3).mean() < 0.03, f"{(difference > 3).mean():.2%} on edges"
-    assert np.median(difference) <= 1
+    differ = difference > np.where(side_walls & textured, 8, 3)
+    assert differ.mean() < 1e-3, f"{differ.sum()} pixels, by up to {difference.max()}"
 
 
 def assert_same_picture(page, scene, view, config=CONFIG):
-    assert_same(picture_of(page), renderer.Runtime(scene, config, rsm_resolution=RESOLUTION).render(view))
+    runtime = renderer.Runtime(scene, config, rsm_resolution=RESOLUTION)
+    assert_same(picture_of(page), runtime, view, textured=bool(scene.textures))
 
 
-@pytest.mark.parametrize("light", ["spot", "wide_spot", "point", "directional"])
-def test_the_picture_is_the_runtimes(opened, light):
-    scene, view = textured_room(), web_view(light)
-    assert_same_picture(opened(page_text(scene, view)), scene, view)
+@pytest.mark.parametrize(
+    ("light", "visibility"),
+    [
+        ("spot", "none"),
+        ("spot", "transmittance"),
+        ("wide_spot", "maps"),
+        ("point", "maps"),
+        ("directional", "maps"),
+    ],
+)
+def test_the_picture_is_the_runtimes(opened, light, visibility):
+    scene, view, config = textured_room(), web_view(light), CONFIG.seen_by(visibility)
+    assert_same_picture(opened(page_text(scene, view, config)), scene, view, config)
 
 
 def test_visibility_maps_are_cast_in_the_page(opened):
@@ -115,7 +123,7 @@ def test_visibility_maps_are_cast_in_the_page(opened):
 
 def test_it_goes_on_being_the_runtimes_when_things_move(opened):
     """Camera and light by keys, parameters by a button; the runtime draws from where things then are."""
-    scene, view = textured_room(), web_view("spot", (96, 72))
+    scene, view = colored_room(), web_view("spot", (96, 72))
     page = opened(page_text(scene, view))
     for key in ("ArrowLeft", "ArrowLeft", "ArrowUp", "+", "d", "d", "s"):
         page.keyboard.press(key)
@@ -130,14 +138,14 @@ def test_it_goes_on_being_the_runtimes_when_things_move(opened):
     assert np.linalg.norm(light.position_world - view.lights[0].position_world) > 0.05
     there = dataclasses.replace(view, camera=camera, lights=(light,))
     exposure = page.evaluate("vpltune.exposure")
-    ours = renderer.Runtime(scene, CONFIG, rsm_resolution=RESOLUTION).render(there, exposure=exposure)
-    assert_same(picture_of(page), ours)
+    runtime = renderer.Runtime(scene, CONFIG, rsm_resolution=RESOLUTION)
+    assert_same(picture_of(page), runtime, there, exposure)
     page.keyboard.press("t")
     assert page.get_attribute("#default", "aria-pressed") == "true"
     parameters = dataclasses.replace(ArtistParameters(), vpl_count=CONFIG.parameters.vpl_count)
     plain = dataclasses.replace(CONFIG, parameters=parameters)
-    ours = renderer.Runtime(scene, plain, rsm_resolution=RESOLUTION).render(there, exposure=exposure)
-    assert_same(picture_of(page), ours)
+    runtime = renderer.Runtime(scene, plain, rsm_resolution=RESOLUTION)
+    assert_same(picture_of(page), runtime, there, exposure)
 
 
 def test_a_sun_turns_and_several_lights_are_chosen_among(opened):

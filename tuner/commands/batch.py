@@ -11,11 +11,12 @@ import typer
 
 from renderer.errors import InputError
 from tuner.commands.options import (
-    LARGEST_VIEW_COUNT,
     SCENE_SECONDS,
-    Bounces,
+    BouncesOption,
     JsonOption,
     SeedOption,
+    StartOption,
+    ViewCountOption,
     ViewSizeOption,
     VisibilityOption,
     parse_size,
@@ -47,18 +48,12 @@ def batch(
         Path,
         typer.Option("-o", "--output", metavar="DIR", help="Folder for records, log, and each scene's fit."),
     ],
-    config: Annotated[
-        str, typer.Option(metavar="START.json", help="Start from this config: a file, `default` or `auto`.")
-    ] = "default",
-    views: Annotated[
-        int, typer.Option(min=1, max=LARGEST_VIEW_COUNT, help="How many views of each scene to fit.")
-    ] = 2,
+    config: StartOption = "default",
+    views: ViewCountOption = 2,
     size: ViewSizeOption = None,
     seed: SeedOption = 0,
     visibility: VisibilityOption = None,
-    bounces: Annotated[
-        Bounces, typer.Option(help="What to fit to: one bounce, or full global illumination.")
-    ] = "1",
+    bounces: BouncesOption = "1",
     workers: Annotated[
         int | None,
         typer.Option(

@@ -1,27 +1,56 @@
 """Which view a command draws: one of a views.json, or one placed from flags, the scene or by choice."""
 
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from renderer.errors import InputError
+from renderer.scene import Camera, Light
+from renderer.view_placement import resolve_camera_and_lights
+from renderer.views import View, read_views
+from tuner.commands.options import parse_size
 from tuner.commands.report import warn
-from tuner.commands.view_flags import ViewFlags
+from tuner.commands.view_flags import camera_from_flags, light_from_flags
+from tuner.commands.view_options import ViewFlags
 
 if TYPE_CHECKING:
-    from renderer.scene import Camera, Light, Scene
-    from renderer.views import View
+    from renderer.scene import Scene
 
 DEFAULT_SIZE = (960, 540)
 
 
-def view_from_file(path: Path | None, name: str | None, flags: ViewFlags) -> "View | None":
-    """The view of `--views` and `--view`; None where no file is given.
+@dataclass(frozen=True)
+class ChosenView:
+    """What the command line says of a view, before the scene is read; None where it does not."""
+
+    from_file: View | None
+    camera: Camera | None
+    light: Light | None
+    size: tuple[int, int]
+
+    def placed(self, scene: "Scene", scene_path: Path) -> View:
+        """The view; what is not said comes from a file beside the scene or the scene, or is chosen, aloud."""
+        if self.from_file is not None:
+            return replace(self.from_file, size=self.size)
+        given = None if self.light is None else (self.light,)
+        camera, lights, notes = resolve_camera_and_lights(scene, scene_path, self.camera, given)
+        warn(notes)
+        return View("main", "fitted", self.size, camera, lights)
+
+
+def chosen_view(views: Path | None, name: str | None, size: str | None, flags: ViewFlags) -> ChosenView:
+    """`--views`, `--view`, `--size` and the flags of camera and light.
 
     Raises:
-        InputError: there is no such view, more than one to choose from, or flags that go with none.
+        InputError: they do not go together, or there is no such view, or a value is out of range.
     """
-    from renderer.views import read_views
+    from_file = _view_from_file(views, name, flags)
+    unasked = DEFAULT_SIZE if from_file is None else from_file.size
+    pixels = unasked if size is None else parse_size(size)
+    return ChosenView(from_file, camera_from_flags(flags), light_from_flags(flags), pixels)
 
+
+def _view_from_file(path: Path | None, name: str | None, flags: ViewFlags) -> View | None:
     if path is None:
         if name is not None:
             raise InputError("--view: names a view of --views FILE, which is missing")
@@ -35,17 +64,3 @@ def view_from_file(path: Path | None, name: str | None, flags: ViewFlags) -> "Vi
     if name is not None and name not in names:
         raise InputError(f"--view: {path} has {', '.join(names)}, got {name!r:.60}")
     return found[0] if name is None else found[names.index(name)]
-
-
-def placed_view(
-    scene: "Scene", scene_path: Path, camera_given: "Camera | None", light_given: "Light | None"
-) -> "View":
-    """Camera and lights from flags, a file beside the scene or the scene; or chosen, and then said."""
-    from renderer.view_placement import resolve_camera_and_lights
-    from renderer.views import View
-
-    camera, lights, notes = resolve_camera_and_lights(
-        scene, scene_path, camera_given, None if light_given is None else (light_given,)
-    )
-    warn(notes)
-    return View("main", "fitted", DEFAULT_SIZE, camera, lights)

@@ -8,25 +8,18 @@ import typer
 from renderer.errors import InputError
 from tuner.commands.options import (
     LARGEST_VIEW_COUNT,
-    Bounces,
-    EyeOption,
+    BouncesOption,
     JsonOption,
-    LightConeOption,
-    LightDirectionOption,
-    LightIntensityOption,
-    LightLookAtOption,
-    LightPositionOption,
-    LightTypeOption,
-    LookAtOption,
     SceneArgument,
     SeedOption,
     SplitErrorOption,
     VisibilityOption,
-    YfovOption,
 )
 from tuner.commands.report import OK, PARTLY_DONE, Report, warn
+from tuner.commands.view_options import ViewFlags, takes_view_flags
 
 
+@takes_view_flags
 def evaluate(
     scene: SceneArgument,
     config: Annotated[
@@ -37,19 +30,10 @@ def evaluate(
     ] = "2",
     seed: SeedOption = 0,
     visibility: VisibilityOption = None,
-    bounces: Annotated[
-        Bounces, typer.Option(help="What to compare with: one bounce, or full global illumination.")
-    ] = "1",
+    bounces: BouncesOption = "1",
     split_error: SplitErrorOption = False,
-    eye: EyeOption = None,
-    look_at: LookAtOption = None,
-    yfov: YfovOption = None,
-    light_type: LightTypeOption = None,
-    light_position: LightPositionOption = None,
-    light_look_at: LightLookAtOption = None,
-    light_direction: LightDirectionOption = None,
-    light_intensity: LightIntensityOption = None,
-    light_cone: LightConeOption = None,
+    *,
+    flags: ViewFlags,
     json: JsonOption = False,
 ) -> Report:
     """Compare default, tuned and ceiling with the reference, on fitted and on held-out views and lights."""
@@ -58,20 +42,9 @@ def evaluate(
     from renderer.tuned_config import read_config
     from tuner.commands.metrics_table import error_budget_table, metrics_table
     from tuner.commands.progress_display import shown_progress
-    from tuner.commands.view_flags import ViewFlags, camera_from_flags, light_from_flags
+    from tuner.commands.view_flags import camera_from_flags, light_from_flags
     from tuner.evaluate_scene import EvaluateOptions, evaluate_scene
 
-    flags = ViewFlags(
-        eye,
-        look_at,
-        yfov,
-        light_type,
-        light_position,
-        light_look_at,
-        light_direction,
-        light_intensity,
-        light_cone,
-    )
     options = EvaluateOptions(
         tuned=read_config(config).seen_by(visibility),
         seed=seed,

@@ -7,31 +7,28 @@ import typer
 
 from renderer.errors import InputError
 from tuner.commands.options import (
-    EyeOption,
     JsonOption,
-    LightConeOption,
-    LightDirectionOption,
-    LightIntensityOption,
-    LightLookAtOption,
-    LightPositionOption,
-    LightTypeOption,
-    LookAtOption,
     VisibilityOption,
-    YfovOption,
-    parse_size,
 )
 from tuner.commands.report import Report, warn
+from tuner.commands.view_options import (
+    PictureSizeOption,
+    ViewFlags,
+    ViewNameOption,
+    ViewsFileOption,
+    takes_view_flags,
+)
 
 if TYPE_CHECKING:
     from renderer.scene_bundle import SceneBundle
     from renderer.tuned_config import TunedConfig
-    from tuner.commands.view_flags import ViewFlags
 
 Form = Literal["json", "glsl", "c", "std140", "gltf", "bundle", "web"]
 WITH_SCENE = ("gltf", "bundle", "web")
 WITH_VIEW = ("bundle", "web")
 
 
+@takes_view_flags
 def export(
     file: Annotated[
         str,
@@ -56,40 +53,19 @@ def export(
         Path | None,
         typer.Option(metavar="SCENE", help="gltf, bundle, web: the scene.", show_default=False),
     ] = None,
-    size: Annotated[str | None, typer.Option(metavar="WxH", help="Picture size. [960x540]")] = None,
+    size: PictureSizeOption = None,
     visibility: VisibilityOption = None,
-    views: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Take camera, lights and size from a views.json.")
-    ] = None,
-    view: Annotated[str | None, typer.Option(metavar="NAME", help="Which of its views.")] = None,
-    eye: EyeOption = None,
-    look_at: LookAtOption = None,
-    yfov: YfovOption = None,
-    light_type: LightTypeOption = None,
-    light_position: LightPositionOption = None,
-    light_look_at: LightLookAtOption = None,
-    light_direction: LightDirectionOption = None,
-    light_intensity: LightIntensityOption = None,
-    light_cone: LightConeOption = None,
+    views: ViewsFileOption = None,
+    view: ViewNameOption = None,
+    *,
+    flags: ViewFlags,
     json: JsonOption = False,
 ) -> Report:
     """Write a config for another program: as text, as bytes, into a glTF scene, or with a scene to draw."""
     from rich.markup import escape
 
     from renderer.tuned_config import read_config
-    from tuner.commands.view_flags import ViewFlags
 
-    flags = ViewFlags(
-        eye,
-        look_at,
-        yfov,
-        light_type,
-        light_position,
-        light_look_at,
-        light_direction,
-        light_intensity,
-        light_cone,
-    )
     if to in WITH_SCENE and scene is None:
         raise InputError(f"--scene: must be given with --to {to}")
     if to not in WITH_SCENE and scene is not None:
@@ -103,10 +79,11 @@ def export(
     config = read_config(file).seen_by(visibility)
     if to in WITH_VIEW:
         from renderer.config_export import refuse_prior
+        from tuner.commands.chosen_view import chosen_view
 
         refuse_prior(config, to)
         assert scene is not None
-        _write_with_view(config, to, output, _bundle(config, scene, size, views, view, flags))
+        _write_with_view(config, to, output, _bundle(config, scene, chosen_view(views, view, size, flags)))
     else:
         _write(config, to, output, scene)
     document = {
@@ -136,31 +113,13 @@ def _write(config: "TunedConfig", to: Form, output: Path, scene: Path | None) ->
         temporary.write_bytes(content)
 
 
-def _bundle(
-    config: "TunedConfig",
-    scene: Path,
-    size: str | None,
-    views: Path | None,
-    name: str | None,
-    flags: "ViewFlags",
-) -> "SceneBundle":
-    import dataclasses
-
-    from tuner.commands.chosen_view import placed_view, view_from_file
-    from tuner.commands.view_flags import camera_from_flags, light_from_flags
-
-    picture_size = None if size is None else parse_size(size)
-    chosen = view_from_file(views, name, flags)
-    camera, light = camera_from_flags(flags), light_from_flags(flags)
-
+def _bundle(config: "TunedConfig", scene: Path, chosen: "ChosenView") -> "SceneBundle":
     from renderer.scene_bundle import scene_bundle
     from renderer.scene_file import read_scene
 
     loaded = read_scene(scene)
     warn(loaded.warnings)
-    drawn = chosen or placed_view(loaded, scene, camera, light)
-    if picture_size is not None:
-        drawn = dataclasses.replace(drawn, size=picture_size)
+    drawn = chosen.placed(loaded, scene)
     if loaded.animation is not None:
         warn(("the scene's animation is left out: it stands as it does at rest",))
     return scene_bundle(loaded, drawn, config)

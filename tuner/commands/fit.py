@@ -8,38 +8,30 @@ import typer
 
 from tuner.commands.command_line import command_line
 from tuner.commands.options import (
-    LARGEST_VIEW_COUNT,
-    Bounces,
-    EyeOption,
+    BouncesOption,
     JsonOption,
-    LightConeOption,
-    LightDirectionOption,
-    LightIntensityOption,
-    LightLookAtOption,
-    LightPositionOption,
-    LightTypeOption,
-    LookAtOption,
     SceneArgument,
     SeedOption,
     SplitErrorOption,
+    StartOption,
+    ViewCountOption,
     ViewSizeOption,
     VisibilityOption,
-    YfovOption,
     parse_size,
 )
 from tuner.commands.report import OK, PARTLY_DONE, Report, warn
+from tuner.commands.view_options import ViewFlags, takes_view_flags
 
 
+@takes_view_flags
 def fit(
     scene: SceneArgument,
     output: Annotated[
         Path,
         typer.Option("-o", "--output", metavar="DIR", help="Folder for tuned.json, pictures and metrics."),
     ],
-    config: Annotated[
-        str, typer.Option(metavar="START.json", help="Start from this config: a file, `default` or `auto`.")
-    ] = "default",
-    views: Annotated[int, typer.Option(min=1, max=LARGEST_VIEW_COUNT, help="How many views to fit.")] = 2,
+    config: StartOption = "default",
+    views: ViewCountOption = 2,
     size: ViewSizeOption = None,
     seed: SeedOption = 0,
     visibility: VisibilityOption = None,
@@ -67,40 +59,20 @@ def fit(
         str | None,
         typer.Option(metavar="WxH", help="Of the frames that are timed. [--size]", show_default=False),
     ] = None,
-    bounces: Annotated[
-        Bounces, typer.Option(help="What to fit to: one bounce, or full global illumination.")
-    ] = "1",
+    bounces: BouncesOption = "1",
     split_error: SplitErrorOption = False,
-    eye: EyeOption = None,
-    look_at: LookAtOption = None,
-    yfov: YfovOption = None,
-    light_type: LightTypeOption = None,
-    light_position: LightPositionOption = None,
-    light_look_at: LightLookAtOption = None,
-    light_direction: LightDirectionOption = None,
-    light_intensity: LightIntensityOption = None,
-    light_cone: LightConeOption = None,
+    *,
+    flags: ViewFlags,
     json: JsonOption = False,
 ) -> Report:
     """Fit a scene: write DIR/tuned.json, views.json, metrics.json, and pictures before and after."""
     from renderer.tuned_config import read_config
     from tuner.commands.budget_flags import budget_from_flags, with_vpl_count
     from tuner.commands.progress_display import shown_progress
-    from tuner.commands.view_flags import ViewFlags, camera_from_flags, light_from_flags
+    from tuner.commands.view_flags import camera_from_flags, light_from_flags
     from tuner.fit_density import FEW_VPLS
     from tuner.fit_scene import FitOptions, fit_scene
 
-    flags = ViewFlags(
-        eye,
-        look_at,
-        yfov,
-        light_type,
-        light_position,
-        light_look_at,
-        light_direction,
-        light_intensity,
-        light_cone,
-    )
     start = with_vpl_count(read_config(config).seen_by(visibility), vpl_count)
     options = FitOptions(
         start=start,

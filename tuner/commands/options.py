@@ -34,6 +34,18 @@ VisibilityOption = Annotated[
     Literal["none", "transmittance", "maps"] | None,
     typer.Option(help="What stands for occluders of VPLs; else what the config says.", show_default=False),
 ]
+StartOption = Annotated[
+    str,
+    typer.Option(
+        "--config", metavar="START.json", help="Start from this config: a file, `default` or `auto`."
+    ),
+]
+ViewCountOption = Annotated[
+    int, typer.Option("--views", min=1, max=LARGEST_VIEW_COUNT, help="How many views of a scene to fit.")
+]
+BouncesOption = Annotated[
+    Bounces, typer.Option(help="What the reference is: one bounce, or full global illumination.")
+]
 ViewSizeOption = Annotated[
     str | None,
     typer.Option("--size", metavar="WxH", help="Of the views, in pixels. [128x96]", show_default=False),
@@ -42,29 +54,6 @@ SplitErrorOption = Annotated[
     bool, typer.Option("--split-error", help="Split the error that is left by cause; draws some more frames.")
 ]
 SeedOption = Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of everything random.")]
-
-VIEW_PANEL = "Camera and light, in world units (else: the scene's own, or chosen)"
-
-
-def _view_option(metavar: str, description: str) -> typer.models.OptionInfo:
-    return typer.Option(metavar=metavar, help=description, show_default=False, rich_help_panel=VIEW_PANEL)
-
-
-EyeOption = Annotated[str | None, _view_option("X,Y,Z", "Where the camera stands.")]
-LookAtOption = Annotated[str | None, _view_option("X,Y,Z", "What it looks at, with +Y up.")]
-YfovOption = Annotated[float | None, _view_option("DEG", "Vertical angle of view, in degrees. [50]")]
-LightTypeOption = Annotated[
-    Literal["spot", "point", "directional"] | None, _view_option("TYPE", "spot, point or directional.")
-]
-LightPositionOption = Annotated[str | None, _view_option("X,Y,Z", "Where a spot or point light stands.")]
-LightLookAtOption = Annotated[str | None, _view_option("X,Y,Z", "What the light points at.")]
-LightDirectionOption = Annotated[str | None, _view_option("X,Y,Z", "The way the light travels.")]
-LightIntensityOption = Annotated[
-    str | None, _view_option("I or R,G,B", "W/sr (spot, point) or W/m² (directional). [1]")
-]
-LightConeOption = Annotated[
-    str | None, _view_option("INNER,OUTER", "A spot's half angles, in degrees. [0,45]")
-]
 
 
 def parse_numbers(text: str, flag: str, counts: tuple[int, ...]) -> list[float]:

@@ -8,24 +8,21 @@ import typer
 
 from renderer.errors import InputError
 from tuner.commands.options import (
-    EyeOption,
     JsonOption,
     Layer,
-    LightConeOption,
-    LightDirectionOption,
-    LightIntensityOption,
-    LightLookAtOption,
-    LightPositionOption,
-    LightTypeOption,
-    LookAtOption,
     Motion,
     SceneArgument,
     VisibilityOption,
-    YfovOption,
     checked_scale,
-    parse_size,
 )
 from tuner.commands.report import Report, warn
+from tuner.commands.view_options import (
+    PictureSizeOption,
+    ViewFlags,
+    ViewNameOption,
+    ViewsFileOption,
+    takes_view_flags,
+)
 
 if TYPE_CHECKING:
     from renderer.light_motion import BouncingLights
@@ -37,6 +34,7 @@ LARGEST_DYNAMIC_LIGHT_COUNT = 1_000_000
 DYNAMIC_LIGHT_SEED = 0
 
 
+@takes_view_flags
 def render(
     scene: SceneArgument,
     output: Annotated[
@@ -52,7 +50,7 @@ def render(
         str, typer.Option(metavar="FILE", help="A tuned config, `default` or `auto`.")
     ] = "default",
     layer: Annotated[Layer, typer.Option(help="Which picture to draw.")] = "final",
-    size: Annotated[str | None, typer.Option(metavar="WxH", help="Picture size. [960x540]")] = None,
+    size: PictureSizeOption = None,
     visibility: VisibilityOption = None,
     interleave: Annotated[
         int, typer.Option(metavar="1|2|4|8", help="Blocks of NxN pixels share the VPLs out: faster above 1.")
@@ -91,19 +89,10 @@ def render(
         Motion, typer.Option(help="What moves besides the scene's animation; auto: both where it has none.")
     ] = "auto",
     scale: Annotated[float, typer.Option(help="Draw scene, camera and light this much larger.")] = 1.0,
-    views: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Take camera, lights and size from a views.json.")
-    ] = None,
-    view: Annotated[str | None, typer.Option(metavar="NAME", help="Which of its views.")] = None,
-    eye: EyeOption = None,
-    look_at: LookAtOption = None,
-    yfov: YfovOption = None,
-    light_type: LightTypeOption = None,
-    light_position: LightPositionOption = None,
-    light_look_at: LightLookAtOption = None,
-    light_direction: LightDirectionOption = None,
-    light_intensity: LightIntensityOption = None,
-    light_cone: LightConeOption = None,
+    views: ViewsFileOption = None,
+    view: ViewNameOption = None,
+    *,
+    flags: ViewFlags,
     json: JsonOption = False,
 ) -> Report:
     """Draw a scene with a config, headless."""
@@ -111,48 +100,32 @@ def render(
     from renderer.runtime_options import INTERLEAVES
     from renderer.tuned_config import read_config
     from renderer.video_file import check_clip_path
-    from tuner.commands.chosen_view import DEFAULT_SIZE, placed_view, view_from_file
+    from tuner.commands.chosen_view import chosen_view
     from tuner.commands.render_clip import write_clip
-    from tuner.commands.view_flags import ViewFlags, camera_from_flags, light_from_flags
 
-    flags = ViewFlags(
-        eye,
-        look_at,
-        yfov,
-        light_type,
-        light_position,
-        light_look_at,
-        light_direction,
-        light_intensity,
-        light_cone,
-    )
     # All that can be refused is refused before the scene is read.
-    picture_size = None if size is None else parse_size(size)
+    chosen = chosen_view(views, view, size, flags)
     if frames is None:
         require_extension(output, ".png", ".exr")
     else:
-        check_clip_path(output, picture_size or DEFAULT_SIZE)
+        check_clip_path(output, chosen.size)
     if not (math.isfinite(fps) and 0.1 <= fps <= 1000.0):
         raise InputError(f"--fps: must lie in [0.1, 1000], got {fps}")
     factor = checked_scale(scale)
     if interleave not in INTERLEAVES:
         raise InputError(f"--interleave: must be one of {INTERLEAVES}, got {interleave}")
     tuned = read_config(config).seen_by(visibility)
-    from_file = view_from_file(views, view, flags)
-    camera, light = camera_from_flags(flags), light_from_flags(flags)
 
     from renderer.runtime import Runtime
     from renderer.runtime_options import RuntimeOptions
     from renderer.scene import scaled
     from renderer.scene_file import read_scene
     from renderer.sequence import Sequence
-    from renderer.views import View, scaled_view
+    from renderer.views import scaled_view
 
     loaded = read_scene(scene)
     warn(loaded.warnings)
-    drawn = from_file or placed_view(loaded, scene, camera, light)
-    if picture_size is not None:
-        drawn = View(drawn.name, drawn.split, picture_size, drawn.camera, drawn.lights)
+    drawn = chosen.placed(loaded, scene)
     sequence = Sequence(loaded, drawn, motion, factor)
     if factor != 1.0:
         loaded, drawn = scaled(loaded, factor), scaled_view(drawn, factor)

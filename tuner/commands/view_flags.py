@@ -1,7 +1,6 @@
 """Camera and light from flags: what may be given together, checked in one place."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64
@@ -10,25 +9,11 @@ from renderer.errors import InputError
 from renderer.scene import Camera, Light, look_at
 from renderer.views import check_cone
 from tuner.commands.options import parse_numbers
+from tuner.commands.view_options import ViewFlags
 
 DEFAULT_YFOV_DEGREES = 50.0
 DEFAULT_CONE_DEGREES = (0.0, 45.0)
 """KHR_lights_punctual's own defaults."""
-
-
-@dataclass(frozen=True)
-class ViewFlags:
-    """The flags as given; None where absent."""
-
-    eye: str | None = None
-    look_at: str | None = None
-    yfov: float | None = None
-    light_type: str | None = None
-    light_position: str | None = None
-    light_look_at: str | None = None
-    light_direction: str | None = None
-    light_intensity: str | None = None
-    light_cone: str | None = None
 
 
 def camera_from_flags(flags: ViewFlags) -> Camera | None:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import moderngl
 import numpy as np
-from jaxtyping import Bool, Float32
+from jaxtyping import Bool, Float32, Int32, UInt32
 
 from renderer.frame import Frame
 from renderer.views import View, ray_directions_world
@@ -12,12 +12,16 @@ from renderer.views import View, ray_directions_world
 
 @dataclass(frozen=True, eq=False)
 class VisibilityMaps:
-    """The surfaces that each VPL sees, along one ray for each texel of its hemisphere."""
+    """The surfaces that each VPL sees, along one ray for each texel of its hemisphere, or several at silhouettes."""
 
     distance: Float32[np.ndarray, "vpls size size"]
-    """In units of L."""
+    """In units of L; 0 where there is a block."""
     normal: Float32[np.ndarray, "vpls size size 3"]
     """Towards the VPL, in its own frame (`hemisphere_frame`)."""
+    block: Int32[np.ndarray, "vpls size size"]
+    """Which block of finer texels stands for this one; -1 where none does. Counts up in the order of texels."""
+    block_distance: Float32[np.ndarray, "blocks refinement refinement"]
+    block_normal: Float32[np.ndarray, "blocks refinement refinement 3"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +83,26 @@ def capture_frame(frame: Frame, view: View) -> CapturedFrame:
 def _visibility_maps(frame: Frame) -> VisibilityMaps | None:
     if frame.vpl_visibility_maps is None:
         return None
-    size = frame.vpl_visibility_maps.size
-    texels = np.frombuffer(frame.vpl_visibility_maps.maps.read(), np.uint32).reshape(-1, size, size, 2)
+    maps = frame.vpl_visibility_maps
+    size, refinement = maps.layout.size, maps.layout.refinement
+    texels = np.frombuffer(maps.maps.read(), np.uint32).reshape(-1, size, size, 2)
+    details = np.frombuffer(maps.details.read(), np.uint32).reshape(-1, refinement, refinement, 2)
+    refined = texels[..., 0] >> 31 != 0
+    # Blocks lie in the order in which the GPU came to them, which is another one each time.
+    details = details[texels[refined][:, 1]]
+    texels = np.where(refined[..., None], np.uint32(0), texels)
+    block = np.full(refined.shape, -1, np.int32)
+    block[refined] = np.arange(len(details), dtype=np.int32)
+    return VisibilityMaps(*_met_surfaces(texels), block, *_met_surfaces(details))
+
+
+def _met_surfaces(
+    texels: UInt32[np.ndarray, "*shape 2"],
+) -> tuple[Float32[np.ndarray, "*shape"], Float32[np.ndarray, "*shape 3"]]:
+    """Distance and normal: `visibility_texel` in shaders/common/vpl_visibility.glsl."""
     packed = np.stack([texels[..., 1] & 0xFFFF, texels[..., 1] >> 16], axis=-1)
     encoded = packed.astype(np.float32) / np.float32(65535.0)
-    return VisibilityMaps(texels[..., 0].copy().view(np.float32), octahedral_decode(encoded))
+    return texels[..., 0].copy().view(np.float32), octahedral_decode(encoded)
 
 
 _DTYPES = {"f1": np.uint8, "f2": np.float16, "f4": np.float32, "nu2": np.uint16}

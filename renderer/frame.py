@@ -42,6 +42,7 @@ from renderer.render_targets import (
 from renderer.runtime_options import RuntimeOptions
 from renderer.scene_buffers import SceneBuffers
 from renderer.views import View
+from renderer.visibility_map_layout import NO_MAPS, VisibilityMapLayout
 
 
 class Frame:
@@ -89,14 +90,15 @@ class Frame:
         self._direct_light = DirectLightPass(context, rsm_resolution)
         self._hierarchy = hierarchy
         self.vpl_visibility_maps: VplVisibilityMapsPass | None = None
+        self._visibility = NO_MAPS
         if hierarchy is not None:
-            self.vpl_visibility_maps = VplVisibilityMapsPass(context, vpl_count, options.visibility_map_size)
-        map_size = options.visibility_map_size if hierarchy is not None else 0
+            self._visibility = VisibilityMapLayout.of(options)
+            self.vpl_visibility_maps = VplVisibilityMapsPass(context, vpl_count, self._visibility)
         self._auto_parameters = auto_parameters
         self._scene_statistics: SceneStatisticsPass | None = None
         if auto_parameters is not None:
-            self._scene_statistics = SceneStatisticsPass(context, map_size)
-        self._vpl_gather = VplGatherPass(context, options.interleave, map_size)
+            self._scene_statistics = SceneStatisticsPass(context, self._visibility)
+        self._vpl_gather = VplGatherPass(context, options.interleave, self._visibility)
         self._interleaved_filter: InterleavedFilterPass | None = None
         if options.interleave > 1:
             self._pixel_list = create_pixel_list(context, size)
@@ -158,8 +160,7 @@ class Frame:
     def read_statistics(self, view: View) -> Float32[np.ndarray, "statistics"]:
         """The statistics of `view`, which has just been drawn: waits for the GPU."""
         if self._scene_statistics is None:
-            map_size = 0 if self.vpl_visibility_maps is None else self.vpl_visibility_maps.size
-            self._scene_statistics = SceneStatisticsPass(self._context, map_size)
+            self._scene_statistics = SceneStatisticsPass(self._context, self._visibility)
         self._scene_statistics.draw(self.camera(view), self.gbuffer, self.virtual_point_lights.count)
         return self._scene_statistics.read()
 

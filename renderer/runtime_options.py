@@ -6,6 +6,7 @@ from typing import Literal, get_args
 from renderer.point_table import PointTable
 
 INTERLEAVES = (1, 2, 4, 8)
+REFINEMENTS = (1, 2, 4, 8)
 LightPath = Literal["auto", "volumes", "tiles"]
 RsmFiltering = Literal[1, 3, 5, 9]
 
@@ -33,6 +34,10 @@ class RuntimeOptions:
     visibility_map_size: int = 24
     """Texels along the side of a VPL's visibility map, in [4, 64], where the config asks for maps."""
 
+    visibility_map_refinement: int = 4
+    """One of `REFINEMENTS`: rays along the side of a map's texel where a silhouette runs through it, 16 in the
+    place of 1. In rooms 3 to 12 % of the texels are, in busy scenes up to 28 %. 1 casts one ray everywhere."""
+
     rsm_filtering: RsmFiltering = 5
     """RSM texels along the side of the square whose mean light a VPL has, while it slides over its surface as
     the light moves. 1 takes one texel's light and place, which then change by jumps."""
@@ -51,6 +56,10 @@ class RuntimeOptions:
             raise ValueError(f"interleave: must be one of {INTERLEAVES}, got {self.interleave!r}")
         if not 4 <= self.visibility_map_size <= 64:
             raise ValueError(f"visibility_map_size: must be in [4, 64], got {self.visibility_map_size!r}")
+        if self.visibility_map_refinement not in REFINEMENTS:
+            raise ValueError(
+                f"visibility_map_refinement: must be one of {REFINEMENTS}, got {self.visibility_map_refinement!r}"
+            )
         if not 0.0 <= self.adaptation_frames <= 1e4:
             raise ValueError(f"adaptation_frames: must be in [0, 10000], got {self.adaptation_frames!r}")
         if self.light_path not in get_args(LightPath):

@@ -1,11 +1,12 @@
 """What VPLs see, from their visibility maps, in JAX: the twin of shaders/common/vpl_visibility.glsl."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+import numpy as np
+from jaxtyping import Array, Float, Float32, Int
 
 from renderer.artist_parameters import ArtistParameters
 from renderer.capture import CapturedFrame, VisibilityMaps
@@ -16,6 +17,7 @@ VISIBILITY_LEAST_LIFT = 1e-3
 """Lift of a map's origin off its surface: footprints, and units of L at least. Twins in GLSL."""
 CHUNK = 128
 """Receivers at once: 128 × 1,024 pairs are half a MiB an array, nine with vectors."""
+_PADDINGS = 4
 
 
 @jax.tree_util.register_dataclass
@@ -36,11 +38,15 @@ class VisibilityParameters:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class MapTexels:
-    """All texels of all maps, VPL by VPL and row by row, in each VPL's frame."""
+    """All texels of all maps, VPL by VPL and row by row, then those of all blocks; in each VPL's frame."""
 
     end: Float[Array, "texels 3"]
     """Where the ray ended, from the map's origin [L]."""
     normal: Float[Array, "texels 3"]
+    block_start: Int[Array, "vpls size size"]
+    """Where the finer texels begin that stand for this one; -1 where none do."""
+    refinement: int = field(metadata={"static": True})
+    """Texels along the side of a block."""
 
 
 def hemi_octahedral_encode(direction: Float[Array, "*n 3"]) -> Float[Array, "*n 2"]:
@@ -74,11 +80,31 @@ def hemisphere_frame(normal: Float[Array, "vpls 3"]) -> Float[Array, "vpls 3 3"]
 
 def map_texels(maps: VisibilityMaps) -> MapTexels:
     """A frame's maps as `vpl_visibility` takes them."""
-    size = maps.distance.shape[1]
+    size, refinement = maps.distance.shape[1], maps.block_distance.shape[1]
+    end = _axes(size)[None] * maps.distance[..., None]
+    _, row, column = np.nonzero(maps.block >= 0)
+    inside = np.arange(refinement)
+    fine_row = (row[:, None] * refinement + inside)[:, :, None]
+    fine_column = (column[:, None] * refinement + inside)[:, None, :]
+    block_end = _axes(size * refinement)[fine_row, fine_column] * maps.block_distance[..., None]
+    # Frames have differing numbers of blocks; padding makes them few, so that little is compiled anew.
+    padding = ((0, -block_end.size // 3 % (1 + maps.distance.size // _PADDINGS)), (0, 0))
+    return MapTexels(
+        _joined(end, np.pad(block_end.reshape(-1, 3), padding)),
+        _joined(maps.normal, np.pad(maps.block_normal.reshape(-1, 3), padding)),
+        jnp.where(maps.block >= 0, maps.distance.size + maps.block * refinement**2, -1),
+        refinement,
+    )
+
+
+def _axes(size: int) -> Float32[np.ndarray, "size size 3"]:
+    """Directions of a map's texels. Twin: `visibility_axis` in GLSL."""
     centers = (jnp.arange(size) + 0.5) * (2.0 / size) - 1.0
-    axes = hemi_octahedral_decode(jnp.stack(jnp.meshgrid(centers, centers), axis=-1))
-    end = axes[None] * jnp.asarray(maps.distance)[..., None]
-    return MapTexels(end.reshape(-1, 3), jnp.asarray(maps.normal).reshape(-1, 3))
+    return np.asarray(hemi_octahedral_decode(jnp.stack(jnp.meshgrid(centers, centers), axis=-1)))
+
+
+def _joined(texels: Float32[np.ndarray, "*n 3"], details: Float32[np.ndarray, "m 3"]) -> Float[Array, "texels 3"]:
+    return jnp.concatenate([texels.reshape(-1, 3), details])
 
 
 def map_visibility(
@@ -117,8 +143,8 @@ def surface_overlap(
     Args:
         receivers, vpls: lengths in units of L.
     """
-    # Every map is square.
-    size = round((texels.end.shape[0] / max(1, len(vpls.position))) ** 0.5)
+    size, refinement = texels.block_start.shape[1], texels.refinement
+    block_start = texels.block_start.reshape(-1)
     frame = hemisphere_frame(vpls.normal)
     lift = jnp.maximum(VISIBILITY_LIFT * vpls.footprint, VISIBILITY_LEAST_LIFT)
     origin = vpls.position + lift[:, None] * vpls.normal
@@ -129,16 +155,18 @@ def surface_overlap(
         in_frame = partial(jnp.einsum, "rvk,vak->rva", precision="highest")
         to_receiver = in_frame(position[:, None, :] - origin[None, :, :], frame)
         normal = jnp.einsum("rk,vak->rva", normal_world, frame, precision="highest")
-        plane = (to_receiver * normal).sum(-1)
-        asked = (to_receiver[..., 2] > 0.0) & (plane < 0.0)
+        asked = (to_receiver[..., 2] > 0.0) & ((to_receiver * normal).sum(-1) < 0.0)
         # Where not asked, any finite direction serves.
         to_receiver = jnp.where(asked[..., None], to_receiver, jnp.array([0.0, 0.0, 1.0]))
         place = (hemi_octahedral_encode(to_receiver) * 0.5 + 0.5) * size
         texel = jnp.minimum(place.astype(jnp.int32), size - 1)
-        index = first + texel[..., 1] * size + texel[..., 0]
+        inside = jnp.minimum(((place - texel) * refinement).astype(jnp.int32), refinement - 1)
+        coarse = first + texel[..., 1] * size + texel[..., 0]
+        fine = block_start[coarse] + inside[..., 1] * refinement + inside[..., 0]
+        index = jnp.where(block_start[coarse] >= 0, fine, coarse)
         end, met_normal = texels.end[index], texels.normal[index]
-        before = (end * normal).sum(-1) - plane
-        behind = ((end - to_receiver) * met_normal).sum(-1)
+        between = end - to_receiver
+        before, behind = (between * normal).sum(-1), (between * met_normal).sum(-1)
         overlap = jnp.minimum(before, behind) / jnp.linalg.norm(to_receiver, axis=-1)
         return jnp.where(asked, overlap, -1.0)
 

@@ -18,6 +18,7 @@ from renderer.scene_statistics import (
     VPLS,
 )
 from renderer.shader_library import load_compute, set_uniforms
+from renderer.visibility_map_layout import VisibilityMapLayout
 
 _GROUP_SIZE = 64
 _GROUPS = RECEIVERS // _GROUP_SIZE
@@ -44,12 +45,12 @@ STATISTICS_DEFINES = {
 class SceneStatisticsPass:
     """G-buffer, VPLs, visibility maps → the statistics of `renderer.scene_statistics`.
 
-    `visibility_map_size` as in the gather; 0 takes all light to be seen.
+    `visibility` as in the gather; without maps all light is taken to be seen.
     """
 
-    def __init__(self, context: moderngl.Context, visibility_map_size: int):
+    def __init__(self, context: moderngl.Context, visibility: VisibilityMapLayout):
         self._context = context
-        defines = {**STATISTICS_DEFINES, "VISIBILITY_MAP_SIZE": visibility_map_size}
+        defines = {**STATISTICS_DEFINES, **visibility.defines}
         self._sums = load_compute(context, "scene_statistics", defines)
         self._ratios = load_compute(context, "scene_statistics_ratios", defines)
         self._buffer = context.buffer(reserve=4 * len(STATISTIC_NAMES) + _GROUPS * _SUMS_BYTES)

@@ -6,6 +6,7 @@ from renderer import buffer_bindings
 from renderer.camera_uniforms import CameraUniforms
 from renderer.render_targets import GBuffer, PixelList
 from renderer.shader_library import load_compute, set_uniforms
+from renderer.visibility_map_layout import NO_MAPS, VisibilityMapLayout
 
 
 class VplGatherPass:
@@ -13,12 +14,14 @@ class VplGatherPass:
 
     `interleave` n: each pixel of an n×n block gathers from its own n²-th part of the VPLs, n² times as
     bright (Keller and Heidrich 2001). Such a picture is for the interleaved filter; 1 is the full gather.
-    `visibility_map_size`: texels along the side of the VPLs' visibility maps; 0 looks at none.
+    `visibility`: the layout of the VPLs' visibility maps, which may be none.
     """
 
-    def __init__(self, context: moderngl.Context, interleave: int = 1, visibility_map_size: int = 0):
+    def __init__(
+        self, context: moderngl.Context, interleave: int = 1, visibility: VisibilityMapLayout = NO_MAPS
+    ):
         self._context = context
-        self._visibility_map_size = visibility_map_size
+        self._visibility = visibility
         self._interleave = interleave
         self._program = self._load(interleave, listed_pixels=False)
         self._listed_program = self._load(1, listed_pixels=True) if interleave > 1 else None
@@ -57,7 +60,7 @@ class VplGatherPass:
             **buffer_bindings.DEFINES,
             "INTERLEAVE": interleave,
             "LISTED_PIXELS": listed_pixels,
-            "VISIBILITY_MAP_SIZE": self._visibility_map_size,
+            **self._visibility.defines,
         }
         return load_compute(self._context, "vpl_gather", defines)
 

@@ -74,7 +74,7 @@ void main() {
     float scene_length = measured_scene_length();
     mat3 frame = hemisphere_frame(vpl.normal_area.xyz);
     ivec2 texel = ivec2(index % VISIBILITY_MAP_SIZE, (index % texels) / VISIBILITY_MAP_SIZE);
-    vec3 axis = visibility_axis(texel);
+    vec3 axis = visibility_axis(texel, VISIBILITY_MAP_SIZE);
     vec3 direction = frame * axis;
     float nearest = longest;
     uint met = RAY_DONE;

@@ -1,0 +1,27 @@
+// The surface that a VPL sees along an axis of its hemisphere.
+#include "common/scene_length.glsl"
+#include "common/virtual_point_lights.glsl"
+#include "common/ray_hierarchy.glsl"
+#include "common/vpl_visibility.glsl"
+
+layout(std430, binding = VIRTUAL_POINT_LIGHTS_BINDING) readonly buffer VirtualPointLights {
+    VirtualPointLight virtual_point_lights[];
+};
+
+uniform float longest;  // the scene's diagonal [world units]
+
+// What meets nothing ends so many diagonals away, at a wall that faces the VPL: no receiver is behind it.
+const float VISIBILITY_NOTHING = 2.0;
+
+uvec2 cast_visibility_texel(VirtualPointLight vpl, vec3 axis) {
+    mat3 frame = hemisphere_frame(vpl.normal_area.xyz);
+    vec3 direction = frame * axis;
+    RayHit hit = RayHit(longest, RAY_NO_TRIANGLE, 0u);
+    if (any(greaterThan(vpl.flux.rgb, vec3(0.0)))) {
+        hit = ray_hit(visibility_origin(vpl, scene_length), direction, longest);
+    }
+    if (hit.triangle == RAY_NO_TRIANGLE) {
+        return visibility_texel(VISIBILITY_NOTHING * longest / scene_length, -axis);
+    }
+    return visibility_texel(hit.distance / scene_length, ray_hit_normal(hit, direction) * frame);
+}

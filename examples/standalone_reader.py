@@ -123,16 +123,16 @@ def displayed(radiance, key):
 def main(folder, output):
     bundle = json.loads((Path(folder) / "bundle.json").read_text(encoding="utf-8"))
     view, rsm, numbers = bundle["view"], bundle["rsm"], bundle["config"]["parameters"]
-    size, camera, map_size = view["size"], np.array(view["camera_to_world"]), bundle["visibility_map_size"]
+    size, camera, maps = view["size"], np.array(view["camera_to_world"]), bundle["visibility_maps"]
     context = moderngl.create_standalone_context(require=430, backend="egl")
     surfaces = Surfaces(context, bundle, (Path(folder) / "bundle.bin").read_bytes())
     atlas = light_maps(surfaces, rsm)
     vpls, length = virtual_point_lights(atlas, bundle)
-    context.buffer(vpls).bind_to_storage_buffer(4)
-    context.buffer(reserve=16 * len(vpls) * max(map_size, 1) ** 2).bind_to_storage_buffer(5)
+    for binding, content in ((4, vpls), (5, bytes(16 * max(maps["map_room"], 1))), (6, bytes(4))):
+        context.buffer(content).bind_to_storage_buffer(binding)
     numbers["falloff_transmittance"] *= bundle["config"]["visibility"] != "none"
-    numbers |= {"scene_length": length, "map_size": map_size, "face_size": rsm["resolution"]}
-    if map_size > 0:
+    numbers |= {"scene_length": length, "face_size": rsm["resolution"], **maps}
+    if maps["map_room"] > 0:
         context.compute_shader(shader("CASTING", numbers.items())).run(len(vpls))
         context.memory_barrier()
     depths = context.texture(atlas.shape[1::-1], 1, atlas[..., 3].astype("f4").tobytes(), dtype="f4")

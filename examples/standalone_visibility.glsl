@@ -1,10 +1,16 @@
 // The visibility maps of standalone_reader.py. CASTING sends rays from every VPL, one through each texel of a small
-// map of its hemisphere, against every triangle: short, not fast. LIGHTING asks the map what the VPL sees on the way
-// to a pixel. The program defines the config's parameters, scene_length, and map_size: texels along the side, or 0.
+// map of its hemisphere, against every triangle: short, not fast. Where what one texel met hides what its neighbour
+// met, a block of finer texels takes its place. LIGHTING asks the map what the VPL sees on the way to a pixel. The
+// program defines the config's parameters, scene_length, map_size (texels along the side, or 0), map_refinement
+// (texels along the side of a block) and map_blocks (for how many there is room).
 
 #if defined(CASTING) || defined(LIGHTING)
 layout(std430, binding = 4) readonly buffer Vpls { vec4 vpls[]; };  // position, footprint; normal; flux
-layout(std430, binding = 5) buffer Maps { vec4 maps[]; };           // what a ray met: normal, distance
+// What a ray met: normal, distance; or -1 - the number of a block. Blocks lie after the maps of all VPLs.
+layout(std430, binding = 5) buffer Maps { vec4 maps[]; };
+const int map_texels = map_size * map_size, block_texels = map_refinement * map_refinement;
+
+int block_start(float number) { return vpls.length() / 3 * map_texels + int(number) * block_texels; }
 
 // Rays start clear of the VPL's own surface.
 vec3 map_origin(int vpl) {
@@ -19,10 +25,15 @@ mat3 map_frame(vec3 n) {
 }
 
 // Unit vectors of the hemisphere on the square [-1, 1]² (Cigolle et al. 2014, "hemi-oct").
-vec3 map_axis(ivec2 texel) {
-    vec2 place = (vec2(texel) + 0.5) * (2.0 / float(map_size)) - 1.0;
+vec3 map_axis(ivec2 texel, int size) {
+    vec2 place = (vec2(texel) + 0.5) * (2.0 / float(size)) - 1.0;
     vec2 p = vec2(place.x + place.y, place.x - place.y) * 0.5;
     return normalize(vec3(p, 1.0 - abs(p.x) - abs(p.y)));
+}
+
+// What was met stands before the other's plane, and that behind its own: by the lesser of the two, of the distance.
+float overlap(vec3 end, vec3 plane, vec3 hidden, vec3 hidden_normal) {
+    return min(dot(end - hidden, hidden_normal), dot(end - hidden, plane)) / length(hidden);
 }
 #endif
 
@@ -52,13 +63,41 @@ vec4 met_by(vec3 origin, vec3 ray) {
     return met;
 }
 
+layout(std430, binding = 6) buffer Counted { uint counted; };
+shared bool is_edge[map_texels];
+
+bool hides(ivec2 texel, ivec2 other, int start, mat3 frame) {
+    vec4 nearer = maps[start + texel.y * map_size + texel.x], farther = maps[start + other.y * map_size + other.x];
+    vec3 end = frame * map_axis(texel, map_size) * nearer.w, hidden = frame * map_axis(other, map_size) * farther.w;
+    return farther.w < 1e5 * scene_length && overlap(end, nearer.xyz, hidden, farther.xyz) > 2e-3;
+}
+
 void main() {
-    int vpl = 3 * int(gl_WorkGroupID.x);
+    int vpl = 3 * int(gl_WorkGroupID.x), start = vpl / 3 * map_texels, lane = int(gl_LocalInvocationID.x);
     vec3 origin = map_origin(vpl);
     mat3 frame = map_frame(vpls[vpl + 1].xyz);
-    for (int texel = int(gl_LocalInvocationID.x); texel < map_size * map_size; texel += 64) {
-        vec3 ray = frame * map_axis(ivec2(texel % map_size, texel / map_size));
-        maps[vpl / 3 * map_size * map_size + texel] = met_by(origin, ray);
+    for (int i = lane; i < map_texels; i += 64) {
+        maps[start + i] = met_by(origin, frame * map_axis(ivec2(i % map_size, i / map_size), map_size));
+    }
+    memoryBarrierBuffer();
+    barrier();
+    for (int i = lane; i < map_texels; i += 64) {
+        ivec2 texel = ivec2(i % map_size, i / map_size);
+        is_edge[i] = false;
+        for (int k = 0; k < 9; ++k) {
+            ivec2 beside = clamp(texel + ivec2(k % 3, k / 3) - 1, ivec2(0), ivec2(map_size - 1));
+            is_edge[i] = is_edge[i] || hides(texel, beside, start, frame) || hides(beside, texel, start, frame);
+        }
+    }
+    barrier();
+    for (int i = lane; i < map_texels; i += 64) {
+        uint block = is_edge[i] ? atomicAdd(counted, 1u) : uint(map_blocks);
+        if (block >= uint(map_blocks)) { continue; }
+        maps[start + i].w = -1.0 - float(block);
+        for (int k = 0; k < block_texels; ++k) {
+            ivec2 texel = ivec2(i % map_size, i / map_size) * map_refinement + ivec2(k % map_refinement, k / map_refinement);
+            maps[block_start(float(block)) + k] = met_by(origin, frame * map_axis(texel, map_size * map_refinement));
+        }
     }
 }
 #endif
@@ -72,10 +111,17 @@ float visibility(int vpl, vec3 position, vec3 normal) {
     vec3 towards = offset * frame;
     if (towards.z <= 0.0 || dot(offset, normal) >= 0.0) { return 1.0; }
     vec2 p = towards.xy / (abs(towards.x) + abs(towards.y) + towards.z);
-    ivec2 texel = min(ivec2((vec2(p.x + p.y, p.x - p.y) * 0.5 + 0.5) * float(map_size)), map_size - 1);
+    vec2 place = (vec2(p.x + p.y, p.x - p.y) * 0.5 + 0.5) * float(map_size);
+    ivec2 texel = min(ivec2(place), map_size - 1);
+    int size = map_size;
     vec4 met = maps[(vpl / 3 * map_size + texel.y) * map_size + texel.x];
-    vec3 past = frame * map_axis(texel) * met.w - offset;
-    float overlap = min(dot(past, normal), dot(past, met.xyz)) / length(offset);
-    return 1.0 - clamp((overlap - visibility_bias) / visibility_softness, 0.0, 1.0);
+    if (met.w < 0.0) {
+        ivec2 inside = min(ivec2((place - vec2(texel)) * float(map_refinement)), map_refinement - 1);
+        met = maps[block_start(-1.0 - met.w) + inside.y * map_refinement + inside.x];
+        texel = texel * map_refinement + inside;
+        size *= map_refinement;
+    }
+    float hidden = overlap(frame * map_axis(texel, size) * met.w, met.xyz, offset, normal);
+    return 1.0 - clamp((hidden - visibility_bias) / visibility_softness, 0.0, 1.0);
 }
 #endif

@@ -8,18 +8,19 @@ from jaxtyping import Bool, Float32, Int32, UInt32
 
 from renderer.frame import Frame
 from renderer.views import View, ray_directions_world
+from renderer.visibility_map_layout import TEXEL_BYTES
 
 
 @dataclass(frozen=True, eq=False)
 class VisibilityMaps:
-    """The surfaces that each VPL sees, along one ray for each texel of its hemisphere, or several at silhouettes."""
+    """The surfaces that each VPL sees: a ray for each texel of its hemisphere, a block at a silhouette."""
 
     distance: Float32[np.ndarray, "vpls size size"]
     """In units of L; 0 where there is a block."""
     normal: Float32[np.ndarray, "vpls size size 3"]
     """Towards the VPL, in its own frame (`hemisphere_frame`)."""
     block: Int32[np.ndarray, "vpls size size"]
-    """Which block of finer texels stands for this one; -1 where none does. Counts up in the order of texels."""
+    """Which block of finer texels stands for this one, counted in the order of texels; -1 where none does."""
     block_distance: Float32[np.ndarray, "blocks refinement refinement"]
     block_normal: Float32[np.ndarray, "blocks refinement refinement 3"]
 
@@ -86,8 +87,11 @@ def _visibility_maps(frame: Frame) -> VisibilityMaps | None:
     maps = frame.vpl_visibility_maps
     size, refinement = maps.layout.size, maps.layout.refinement
     texels = np.frombuffer(maps.maps.read(), np.uint32).reshape(-1, size, size, 2)
-    details = np.frombuffer(maps.details.read(), np.uint32).reshape(-1, refinement, refinement, 2)
     refined = texels[..., 0] >> 31 != 0
+    # At least one: OpenGL does not read nothing.
+    used_bytes = max(1, int(refined.sum())) * refinement**2 * TEXEL_BYTES
+    details = np.frombuffer(maps.details.read(used_bytes), np.uint32)
+    details = details.reshape(-1, refinement, refinement, 2)
     # Blocks lie in the order in which the GPU came to them, which is another one each time.
     details = details[texels[refined][:, 1]]
     texels = np.where(refined[..., None], np.uint32(0), texels)

@@ -35,8 +35,8 @@ class RuntimeOptions:
     """Texels along the side of a VPL's visibility map, in [4, 64], where the config asks for maps."""
 
     visibility_map_refinement: int = 4
-    """One of `REFINEMENTS`: rays along the side of a map's texel where a silhouette runs through it, 16 in the
-    place of 1. In rooms 3 to 12 % of the texels are, in busy scenes up to 28 %. 1 casts one ray everywhere."""
+    """One of `REFINEMENTS`: rays along the side of a texel where a silhouette runs through it. With 4, maps
+    are as good as four times their size, for 1.5 to 5 times the rays instead of 16."""
 
     rsm_filtering: RsmFiltering = 5
     """RSM texels along the side of the square whose mean light a VPL has, while it slides over its surface as
@@ -58,7 +58,8 @@ class RuntimeOptions:
             raise ValueError(f"visibility_map_size: must be in [4, 64], got {self.visibility_map_size!r}")
         if self.visibility_map_refinement not in REFINEMENTS:
             raise ValueError(
-                f"visibility_map_refinement: must be one of {REFINEMENTS}, got {self.visibility_map_refinement!r}"
+                f"visibility_map_refinement: must be one of {REFINEMENTS}, "
+                f"got {self.visibility_map_refinement!r}"
             )
         if not 0.0 <= self.adaptation_frames <= 1e4:
             raise ValueError(f"adaptation_frames: must be in [0, 10000], got {self.adaptation_frames!r}")

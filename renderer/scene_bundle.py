@@ -25,6 +25,7 @@ from renderer.runtime_options import RuntimeOptions
 from renderer.scene import Scene, Texture, transform_normals, transform_points
 from renderer.tuned_config import TunedConfig, config_text
 from renderer.views import View, light_to_json
+from renderer.visibility_map_layout import NO_MAPS, VisibilityMapLayout
 
 FORMAT = "vpltune-bundle"
 VERSION = 1
@@ -84,12 +85,24 @@ def scene_bundle(
             "faces": _faces(records, resolution),
         },
         "point_table": {"kind": "r2", "steps": list(R2_STEPS)},
-        "visibility_map_size": options.visibility_map_size if config.visibility == "maps" else 0,
+        "visibility_maps": _visibility_maps(options, config),
         "draws": draws,
         "textures": [_texture(texture, binary) for texture in (*scene.textures, WHITE)],
         "arrays": binary.arrays,
     }
     return SceneBundle(document, bytes(binary.content))
+
+
+def _visibility_maps(options: RuntimeOptions, config: TunedConfig) -> dict[str, int]:
+    layout = VisibilityMapLayout.of(options) if config.visibility == "maps" else NO_MAPS
+    vpl_count = config.parameters.vpl_count
+    blocks = layout.blocks(vpl_count)
+    return {
+        "map_size": layout.size,
+        "map_refinement": layout.refinement,
+        "map_blocks": blocks,
+        "map_room": vpl_count * layout.size**2 + blocks * layout.refinement**2,
+    }
 
 
 def left_out(config: TunedConfig) -> tuple[str, ...]:

@@ -34,7 +34,7 @@ RSM_DIVISORS = (1, 2, 4)
 
 _RSM_PASSES = frozenset({"reflective_shadow_map", "vpl_importance", "virtual_point_lights"})
 _GATHER_PASSES = frozenset({"vpl_gather", "interleaved_filter"})
-_FORMAT = 2
+_FORMAT = 3
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,8 @@ TURNS = 2
 STARTS = 9
 """Along each axis of the grid from whose best point a descent begins."""
 NODES = 96
-"""Of the grid, geometric in the overlap: each a tenth above the one before. Half as many miss planted values by a tenth."""
+"""Of the grid, geometric in the overlap, each a tenth above the one before: half as many miss planted values
+by a tenth."""
 _LEAST = VISIBILITY_SPECS[0].low
 _MOST = sum(spec.high for spec in VISIBILITY_SPECS)
 

@@ -18,6 +18,7 @@ VISIBILITY_LEAST_LIFT = 1e-3
 CHUNK = 128
 """Receivers at once: 128 × 1,024 pairs are half a MiB an array, nine with vectors."""
 _PADDINGS = 4
+"""Of the room for blocks: in steps of so many-th parts of the texels."""
 
 
 @jax.tree_util.register_dataclass
@@ -103,7 +104,9 @@ def _axes(size: int) -> Float32[np.ndarray, "size size 3"]:
     return np.asarray(hemi_octahedral_decode(jnp.stack(jnp.meshgrid(centers, centers), axis=-1)))
 
 
-def _joined(texels: Float32[np.ndarray, "*n 3"], details: Float32[np.ndarray, "m 3"]) -> Float[Array, "texels 3"]:
+def _joined(
+    texels: Float32[np.ndarray, "vpls size size 3"], details: Float32[np.ndarray, "n 3"]
+) -> Float[Array, "texels 3"]:
     return jnp.concatenate([texels.reshape(-1, 3), details])
 
 

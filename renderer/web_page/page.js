@@ -309,14 +309,26 @@ class Frame {
       this.rays[name] = floatTexture(columns, height, { [gl.RGBA32UI]: "RGBA32UI", [gl.RGBA32F]: "RGBA32F" }[format[0]]);
       gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, columns, height, format[1], format[2], values);
     }
-    const texels = most * bundle.visibility_map_size ** 2;
-    this.visibility = makeTarget(columns, Math.ceil(texels / columns), ["RG32UI"]);
+    const texels = most * bundle.visibility_maps.map_size ** 2;
+    const rows = Math.ceil(texels / columns);
+    this.visibility = makeTarget(columns, rows, ["RG32UI"]);
+    const finer = bundle.visibility_maps.map_refinement;
+    if (finer > 1) {
+      this.castMaps = makeTarget(columns, rows, ["RG32UI"]);
+      this.visibilityDetails = makeTarget(columns * finer, rows * finer, ["RG32UI"]);
+    }
   }
 
   castVisibility(vpl_count) {
     const [vpl_position_footprint, vpl_normal_area, vpl_flux] = this.vpls.textures;
     const vpls = { vpl_position_footprint, vpl_normal_area, vpl_flux, vpl_count };
-    fill(this.visibility, this.programs.vpl_visibility_maps, { ...this.rays, ...vpls, ...this.momentSums });
+    const values = { ...this.rays, ...vpls, ...this.momentSums };
+    fill(this.castMaps ?? this.visibility, this.programs.vpl_visibility_maps, values);
+    if (this.castMaps) {
+      const { vpl_visibility_edges, vpl_visibility_details } = this.programs;
+      fill(this.visibility, vpl_visibility_edges, { ...values, visibility_atlas: this.castMaps.textures[0] });
+      fill(this.visibilityDetails, vpl_visibility_details, { ...values, visibility_atlas: this.visibility.textures[0] });
+    }
   }
 
   get rsmValues() {
@@ -401,7 +413,7 @@ class Frame {
     fill(target, this.programs.vpl_gather, {
       ...this.cameraValues(camera), ...parameters, ...this.momentSums, falloff_transmittance, first, end,
       vpl_position_footprint, vpl_normal_area, vpl_flux, earlier: earlier.textures[0],
-      visibility_atlas: this.visibility?.textures[0],
+      visibility_atlas: this.visibility?.textures[0], visibility_details: this.visibilityDetails?.textures[0],
     });
     this.indirect.reverse();
   }

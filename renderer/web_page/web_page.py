@@ -39,6 +39,7 @@ _SHADERS = (
     "web/tone_mapping.frag",
 )
 _MAP_SHADERS = ("web/vpl_visibility_maps.frag",)
+_DETAIL_SHADERS = ("web/vpl_visibility_edges.frag", "web/vpl_visibility_details.frag")
 _HEADER = """#version 300 es
 precision highp float;
 precision highp int;
@@ -97,7 +98,8 @@ def _defines(document: dict[str, Any]) -> dict[str, Define]:
         "RSM_FILTERING": document["rsm"]["filtering"],
         "VPL_COLUMNS": VPL_COLUMNS,
         "DATA_COLUMNS": DATA_COLUMNS,
-        "VISIBILITY_MAP_SIZE": document["visibility_map_size"],
+        "VISIBILITY_MAP_SIZE": document["visibility_maps"]["map_size"],
+        "VISIBILITY_MAP_REFINEMENT": document["visibility_maps"]["map_refinement"],
         "RAY_COUNT_BITS": COUNT_BITS,
         "RAY_STACK_SIZE": _TREE_DEPTH,
         "EXPOSURE_KEY": EXPOSURE_KEY,
@@ -128,7 +130,11 @@ def _whole_rows(values: np.ndarray) -> np.ndarray:
 
 
 def _shaders(defines: dict[str, Define]) -> dict[str, str]:
-    names = _SHADERS + (_MAP_SHADERS if defines["VISIBILITY_MAP_SIZE"] else ())
+    names = _SHADERS
+    if defines["VISIBILITY_MAP_SIZE"]:
+        names += _MAP_SHADERS
+        if defines["VISIBILITY_MAP_REFINEMENT"] > 1:
+            names += _DETAIL_SHADERS
     return {name: _web_glsl(name, defines) for name in names}
 
 

@@ -10,9 +10,6 @@ layout(std430, binding = VIRTUAL_POINT_LIGHTS_BINDING) readonly buffer VirtualPo
 
 uniform float longest;  // the scene's diagonal [world units]
 
-// What meets nothing ends so many diagonals away, at a wall that faces the VPL: no receiver is behind it.
-const float VISIBILITY_NOTHING = 2.0;
-
 uvec2 cast_visibility_texel(VirtualPointLight vpl, vec3 axis) {
     mat3 frame = hemisphere_frame(vpl.normal_area.xyz);
     vec3 direction = frame * axis;

@@ -14,10 +14,13 @@ layout(std430, binding = VISIBILITY_DETAILS_BINDING) buffer VisibilityDetails {
     uvec2 visibility_details[];
 };
 #define VISIBILITY_MAP_ENTRY(index) visibility_maps[index]
-#define VISIBILITY_DETAIL_ENTRY(index) visibility_details[index]
+#define VISIBILITY_DETAIL_ENTRY(block, inside) \
+    visibility_details[(int(block) * VISIBILITY_MAP_REFINEMENT + inside.y) * VISIBILITY_MAP_REFINEMENT + inside.x]
 #endif
 
 const uint VISIBILITY_BLOCK_BIT = 0x80000000u;
+// What meets nothing ends so many diagonals of the scene away, at a wall that faces the VPL: no receiver is behind it.
+const float VISIBILITY_NOTHING = 2.0;
 
 // What a VPL sees, in its frame.
 struct MetSurface {
@@ -68,7 +71,7 @@ MetSurface seen_surface(vec3 direction, int map_start) {
     if ((entry.x & VISIBILITY_BLOCK_BIT) != 0u) {
         const int refinement = VISIBILITY_MAP_REFINEMENT;
         ivec2 inside = min(ivec2((place - vec2(texel)) * float(refinement)), ivec2(refinement - 1));
-        entry = VISIBILITY_DETAIL_ENTRY((int(entry.y) * refinement + inside.y) * refinement + inside.x);
+        entry = VISIBILITY_DETAIL_ENTRY(entry.y, inside);
         texel = texel * refinement + inside;
         size *= refinement;
     }

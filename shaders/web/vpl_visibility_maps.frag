@@ -1,95 +1,14 @@
-// One texel of a VPL's visibility map, as shaders/vpl_visibility_maps.comp has it: one ray through one tree of
-// boxes over all triangles as they stand in the world.
-#include "common/virtual_point_lights.glsl"
-#include "common/ray_intersection.glsl"
-#include "web/scene_length.glsl"
-#include "web/visibility_atlas.glsl"
-#include "web/vpl_texture.glsl"
-
-uniform usampler2D ray_nodes;      // two texels each: low corner and child, high corner
-uniform sampler2D ray_triangles;   // three texels each
-uniform int vpl_count;
-uniform float longest;
+// One texel of a VPL's visibility map.
+#include "web/visibility_ray.glsl"
 
 layout(location = 0) out uvec2 out_texel;
 
-const uint RAY_COUNT_MASK = (1u << RAY_COUNT_BITS) - 1u;
-const uint RAY_DONE = 0xFFFFFFFFu;
-
-ivec2 data_texel(uint index) {
-    return ivec2(int(index) % DATA_COLUMNS, int(index) / DATA_COLUMNS);
-}
-
-RayTriangle triangle_at(uint index) {
-    return RayTriangle(
-        texelFetch(ray_triangles, data_texel(3u * index), 0).xyz,
-        texelFetch(ray_triangles, data_texel(3u * index + 1u), 0).xyz,
-        texelFetch(ray_triangles, data_texel(3u * index + 2u), 0).xyz);
-}
-
-// Where the ray enters a node's box, or RAY_MISS; and the node's child.
-float node_distance(SpaceRay ray, uint node, float nearest, out uint child) {
-    uvec4 low = texelFetch(ray_nodes, data_texel(2u * node), 0);
-    uvec4 high = texelFetch(ray_nodes, data_texel(2u * node + 1u), 0);
-    child = low.w;
-    return box_distance(ray, uintBitsToFloat(low.xyz), uintBitsToFloat(high.xyz), nearest);
-}
-
-// The nearest triangle on a ray, and its distance; RAY_DONE where there is none nearer than `longest`.
-uint nearest_triangle(SpaceRay ray, inout float nearest) {
-    uint stack[RAY_STACK_SIZE];
-    int height = 0;
-    uint found = RAY_DONE;
-    uint current = uint(RAY_ROOT);
-    while (current != RAY_DONE) {
-        uint count = current & RAY_COUNT_MASK;
-        uint first = current >> RAY_COUNT_BITS;
-        for (uint i = first; i < first + count; ++i) {
-            float met = triangle_distance(ray, triangle_at(i), nearest);
-            if (met < nearest) { nearest = met; found = i; }
-        }
-        uint next = RAY_DONE;
-        if (count == 0u) {
-            uint left_child, right_child;
-            float left = node_distance(ray, first, nearest, left_child);
-            float right = node_distance(ray, first + 1u, nearest, right_child);
-            bool right_first = right < left;
-            if (max(left, right) < RAY_MISS) { stack[height++] = right_first ? left_child : right_child; }
-            if (min(left, right) < RAY_MISS) { next = right_first ? right_child : left_child; }
-        }
-        if (next == RAY_DONE && height > 0) { next = stack[--height]; }
-        current = next;
-    }
-    return found;
-}
-
 void main() {
-    const int texels = VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE;
+    const int size = VISIBILITY_MAP_SIZE, texels = size * size;
     int index = int(gl_FragCoord.y) * DATA_COLUMNS + int(gl_FragCoord.x);
     out_texel = uvec2(0u);
-    if (index >= vpl_count * texels) {
-        return;
+    if (index < vpl_count * texels) {
+        ivec2 texel = ivec2(index % size, (index % texels) / size);
+        out_texel = cast_visibility_texel(vpl_at(index / texels), visibility_axis(texel, size));
     }
-    VirtualPointLight vpl = vpl_at(index / texels);
-    float scene_length = measured_scene_length();
-    mat3 frame = hemisphere_frame(vpl.normal_area.xyz);
-    ivec2 texel = ivec2(index % VISIBILITY_MAP_SIZE, (index % texels) / VISIBILITY_MAP_SIZE);
-    vec3 axis = visibility_axis(texel, VISIBILITY_MAP_SIZE);
-    vec3 direction = frame * axis;
-    float nearest = longest;
-    uint met = RAY_DONE;
-    if (any(greaterThan(vpl.flux.rgb, vec3(0.0)))) {
-        met = nearest_triangle(space_ray(visibility_origin(vpl, scene_length), direction), nearest);
-    }
-    // What meets nothing ends twice the scene away, at a wall that faces the VPL: no receiver is behind it.
-    vec3 normal = -axis;
-    if (met != RAY_DONE) {
-        RayTriangle triangle = triangle_at(met);
-        vec3 across = cross(triangle.b - triangle.a, triangle.c - triangle.a);
-        vec3 size = abs(across);
-        vec3 plane = normalize(across / max(max(size.x, size.y), max(size.z, 1e-30)));
-        normal = (dot(plane, direction) > 0.0 ? -plane : plane) * frame;
-    }
-    float end = met != RAY_DONE ? nearest : 2.0 * longest;
-    out_texel = visibility_texel(end / scene_length, normal);
 }

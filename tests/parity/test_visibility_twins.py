@@ -10,6 +10,7 @@ from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 from renderer.artist_parameters import ArtistParameters
 from renderer.capture import CapturedFrame
 from renderer.runtime import Runtime
+from renderer.runtime_options import RuntimeOptions
 from renderer.scene import Camera, Light, look_at, scaled
 from renderer.scene_file import read_scene
 from renderer.tuned_config import TunedConfig
@@ -138,3 +139,27 @@ def test_more_vpls_keep_the_mean(gl_context, light):
         captured = Runtime(colored_room(), config, context=gl_context).capture(room_view(light, (96, 72)))
         means.append(captured.vpl_irradiance[captured.valid].mean())
     assert means[1] == pytest.approx(means[0], rel=1e-2)
+
+
+def test_finer_texels_lie_at_silhouettes_alone(gl_context):
+    """Boxes in a room refine some texels; a floor with two walls, an open, convex scene, refines none."""
+    room = Runtime(colored_room(), MAPS, context=gl_context).capture(room_view("spot")).visibility_maps
+    assert 0.01 < (room.block >= 0).mean() < 0.2
+    assert len(room.block_distance) == (room.block >= 0).sum()
+    corner = Runtime(walled_scene(False), MAPS, context=gl_context).capture(room_view("spot")).visibility_maps
+    assert not (corner.block >= 0).any()
+
+
+def test_refined_maps_are_nearly_maps_so_much_finer(gl_context):
+    """24² texels refined 2 times, against 48²: a third of the error of 24² alone; a fifth was measured.
+
+    What is left: things so small that none of a texel's neighbours met them.
+    """
+    scene, view = colored_room(), room_view("spot")
+
+    def light(size: int, refinement: int) -> np.ndarray:
+        options = RuntimeOptions(visibility_map_size=size, visibility_map_refinement=refinement)
+        return Runtime(scene, MAPS, options, context=gl_context).capture(view).vpl_irradiance
+
+    finer = light(48, 1)
+    assert relative_rms(light(24, 2), finer) < relative_rms(light(24, 1), finer) / 3.0

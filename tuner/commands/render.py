@@ -65,6 +65,10 @@ def render(
             show_default=False,
         ),
     ] = None,
+    map_refinement: Annotated[
+        int,
+        typer.Option(metavar="1|2|4|8", help="How many times finer maps are at silhouettes."),
+    ] = 4,
     rsm_resolution: Annotated[
         int | None,
         typer.Option(
@@ -97,7 +101,7 @@ def render(
 ) -> Report:
     """Draw a scene with a config, headless."""
     from renderer.image_file import require_extension
-    from renderer.runtime_options import INTERLEAVES
+    from renderer.runtime_options import INTERLEAVES, REFINEMENTS
     from renderer.tuned_config import read_config
     from renderer.video_file import check_clip_path
     from tuner.commands.chosen_view import chosen_view
@@ -114,6 +118,8 @@ def render(
     factor = checked_scale(scale)
     if interleave not in INTERLEAVES:
         raise InputError(f"--interleave: must be one of {INTERLEAVES}, got {interleave}")
+    if map_refinement not in REFINEMENTS:
+        raise InputError(f"--map-refinement: must be one of {REFINEMENTS}, got {map_refinement}")
     tuned = read_config(config).seen_by(visibility)
 
     from renderer.runtime import Runtime
@@ -132,6 +138,7 @@ def render(
     options = RuntimeOptions(
         interleave=interleave,
         visibility_map_size=map_size or RuntimeOptions.visibility_map_size,
+        visibility_map_refinement=map_refinement,
         # A clip is eased over a quarter of a second; a still takes what it asks for.
         adaptation_frames=0.0 if frames is None else fps / 4.0,
     )

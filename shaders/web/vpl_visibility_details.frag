@@ -1,0 +1,16 @@
+// One texel of a block that stands for a visibility map's texel, where a silhouette runs through that.
+#include "web/visibility_ray.glsl"
+
+layout(location = 0) out uvec2 out_texel;
+
+void main() {
+    const int size = VISIBILITY_MAP_SIZE, refinement = VISIBILITY_MAP_REFINEMENT, texels = size * size;
+    ivec2 place = ivec2(gl_FragCoord.xy), block = place / refinement;
+    int index = block.y * DATA_COLUMNS + block.x;
+    out_texel = uvec2(0u);
+    if (index < vpl_count * texels && (VISIBILITY_MAP_ENTRY(index).x & VISIBILITY_BLOCK_BIT) != 0u) {
+        ivec2 coarse = ivec2(index % size, (index % texels) / size);
+        ivec2 texel = coarse * refinement + place % refinement;
+        out_texel = cast_visibility_texel(vpl_at(index / texels), visibility_axis(texel, size * refinement));
+    }
+}

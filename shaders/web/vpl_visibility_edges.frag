@@ -1,0 +1,26 @@
+// A visibility map's texel once more, or the place of its block where a silhouette runs through.
+#include "common/virtual_point_lights.glsl"
+#include "web/scene_length.glsl"
+#include "web/visibility_atlas.glsl"
+
+const int SIZE = VISIBILITY_MAP_SIZE, TEXELS = SIZE * SIZE;
+int map_start;
+#define SILHOUETTE_ENTRY(texel) VISIBILITY_MAP_ENTRY(map_start + texel.y * SIZE + texel.x)
+#include "common/visibility_silhouette.glsl"
+
+uniform int vpl_count;
+uniform float longest;
+
+layout(location = 0) out uvec2 out_texel;
+
+void main() {
+    int index = int(gl_FragCoord.y) * DATA_COLUMNS + int(gl_FragCoord.x);
+    out_texel = VISIBILITY_MAP_ENTRY(index);
+    if (index < vpl_count * TEXELS) {
+        map_start = index - index % TEXELS;
+        ivec2 texel = ivec2(index % SIZE, (index % TEXELS) / SIZE);
+        if (is_silhouette(texel, 1.5 * longest / measured_scene_length())) {
+            out_texel = visibility_block(uint(index));
+        }
+    }
+}

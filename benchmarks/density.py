@@ -1,7 +1,7 @@
-"""Error against the number of VPLs: drawn uniformly, by default, and fitted; on rotations not fitted to.
+"""Error against the number of VPLs, on rotations not fitted to: uniform, default, cells and fitted.
 
-With visibility maps, on fitted and held-out views. γ and η are fitted once for each scene, at `FITTED_COUNT`
-VPLs, the falloff at every count. Curves go to out/density/curves.json and out/density/curves.png.
+With visibility maps, on fitted and held-out views. γ, η and the maps' parameters are fitted once for each
+scene, at `FITTED_COUNT` VPLs, the falloff at every count. Curves go to out/density/curves.{json,png}.
 
 `python -m benchmarks.density SCENE …` does it for some of the scenes only.
 """
@@ -23,7 +23,7 @@ from renderer.runtime import Runtime
 from renderer.runtime_options import RuntimeOptions
 from renderer.tuned_config import TunedConfig
 from tuner.captured_view import CapturedView
-from tuner.fit_density import fit_density, rotated_views, rotation_errors, table_rotations
+from tuner.fit_density import RELAXATION, fit_density, rotated_views, rotation_errors, table_rotations
 from tuner.fit_falloff import fit_falloff
 from tuner.prepare_scene import PreparedScene, SceneOptions, Stopwatch, prepare_scene
 
@@ -34,6 +34,8 @@ SCENES = (
     "bevy-cornellbox",
     "godot-living-room",
     "kajiya-cornell-box",
+    "godot-zdm2",
+    "nvpro-cornellbox",
 )
 SIZE = (64, 48)
 COUNTS = (8, 16, 32, 64, 128, 256, 512, 1024)
@@ -44,7 +46,12 @@ ROTATIONS = 4
 """To fit to, and as many others to measure on."""
 SLOPE_STEPS = 20
 """Along η, at each of which the sign of the measured slope is compared with the smooth trend's."""
-_UNIFORM = ArtistParameters(density_exponent=0.0)
+_UNFITTED = {
+    "uniform": ArtistParameters(density_exponent=0.0),
+    "default": ArtistParameters(),
+    "cells": ArtistParameters(density_relaxation=RELAXATION),
+}
+VARIANTS = (*_UNFITTED, "fitted")
 
 Curve = dict[int, float]
 Progress = Callable[[str, float], None]
@@ -57,6 +64,8 @@ class SceneCurves:
     name: str
     uniform: Curve
     default: Curve
+    cells: Curve
+    """The default's, but for the cells."""
     fitted: Curve
     interleaved: Curve
     """Fitted, by side of the block: FITTED_COUNT VPLs for each pixel, side² times as many in all."""
@@ -81,6 +90,20 @@ def curve_rows(curves: Sequence[SceneCurves]) -> list[Row]:
         made += [
             Row(
                 f"vpls_for_same_error.{scene.name}", float(FITTED_COUNT), "VPLs", "uniform over texels", same
+            ),
+            Row(
+                f"tuned_vpls_for_default_256.{scene.name}",
+                count_for_error(scene.fitted, scene.default[DEFAULT_COUNT]),
+                "VPLs",
+                "default",
+                float(DEFAULT_COUNT),
+            ),
+            Row(
+                f"tuned_32_over_cells_256.{scene.name}",
+                scene.fitted[FITTED_COUNT],
+                "relMSE",
+                f"default but for its cells at {DEFAULT_COUNT} VPLs",
+                scene.cells[DEFAULT_COUNT],
             ),
             Row(
                 f"tuned_32_over_default_256.{scene.name}",
@@ -114,7 +137,7 @@ def curve_rows(curves: Sequence[SceneCurves]) -> list[Row]:
 
 
 def measured_curves(name: str, path: Path, progress: Progress) -> SceneCurves:
-    """All three curves of one scene."""
+    """All curves of one scene."""
     prepared = _prepared(path)
     runtime, views = prepared.runtime, prepared.views
     fitted_views = [view for view in views if view.view.split == "fitted"]
@@ -122,18 +145,14 @@ def measured_curves(name: str, path: Path, progress: Progress) -> SceneCurves:
     progress(f"{name}: density", 0.0)
     start = ArtistParameters(vpl_count=FITTED_COUNT)
     found = fit_density(runtime, fitted_views, start, rotations=rotations).parameters
-    curves: dict[str, Curve] = {"uniform": {}, "default": {}, "fitted": {}}
+    curves: dict[str, Curve] = {variant: {} for variant in VARIANTS}
     fits: dict[int, ArtistParameters] = {}
     for index, count in enumerate(COUNTS):
         progress(f"{name}: {count} VPLs", index / len(COUNTS))
         drawn = replace(found, vpl_count=count)
         tuned = fit_falloff(rotated_views(runtime, fitted_views, drawn, rotations), drawn)[0]
         fits[count] = tuned
-        for variant, parameters in (
-            ("uniform", _UNIFORM),
-            ("default", ArtistParameters()),
-            ("fitted", tuned),
-        ):
+        for variant, parameters in (*_UNFITTED.items(), ("fitted", tuned)):
             curves[variant][count] = _error(runtime, views, replace(parameters, vpl_count=count))
     curves["interleaved"] = {
         side: _interleaved_error(prepared, fits[FITTED_COUNT * side**2], side) for side in INTERLEAVES
@@ -177,9 +196,7 @@ def write_curves(folder: Path, curves: Sequence[SceneCurves]) -> None:
 
     document = {
         scene.name: {
-            "uniform": scene.uniform,
-            "default": scene.default,
-            "fitted": scene.fitted,
+            **{variant: getattr(scene, variant) for variant in VARIANTS},
             "interleaved": scene.interleaved,
             "parameters": scene.parameters.as_dict(),
         }
@@ -191,7 +208,7 @@ def write_curves(folder: Path, curves: Sequence[SceneCurves]) -> None:
     figure = Figure(figsize=(4.0 * columns, 3.2 * lines), layout="constrained")
     panels = figure.subplots(lines, columns, squeeze=False).ravel()
     for axes, scene in zip(panels, curves, strict=False):
-        for label in ("uniform", "default", "fitted"):
+        for label in VARIANTS:
             curve = getattr(scene, label)
             axes.loglog(list(curve), list(curve.values()), "o-", markersize=3, label=label)
         axes.set(title=scene.name, xlabel="VPLs", ylabel="relMSE")

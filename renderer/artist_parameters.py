@@ -169,6 +169,18 @@ ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
         fitted=False,
     ),
     ParameterSpec(
+        name="density_relaxation",
+        symbol="λ",
+        default=0,
+        low=0,
+        high=16,
+        scale="linear",
+        unit="steps",
+        meaning="0 draws VPLs as points; else each has the light of a cell, and moves so often to its middle",
+        fitted=False,
+        whole_number=True,
+    ),
+    ParameterSpec(
         name="screen_space_radius",
         symbol="ρ",
         # What is withheld falls as 1/d⁴: at 3 footprints, little is left beyond. Contacts of six scenes were
@@ -217,6 +229,7 @@ class ArtistParameters:
     vpl_count: int = int(_SPECS["vpl_count"].default)
     density_exponent: float = float(_SPECS["density_exponent"].default)
     density_importance: float = float(_SPECS["density_importance"].default)
+    density_relaxation: int = int(_SPECS["density_relaxation"].default)
     screen_space_radius: float = float(_SPECS["screen_space_radius"].default)
     screen_space_strength: float = float(_SPECS["screen_space_strength"].default)
 

@@ -1,7 +1,7 @@
 """One frame, as the diagram has it.
 
-G-buffer ► lights ► RSM ► importance ► VPLs ► visibility maps ► gather ► filter ► screen-space
-► resolve ► tone curve.
+G-buffer ► lights ► RSM ► importance ► VPLs ► cells ► visibility maps ► gather ► filter
+► screen-space ► resolve ► tone curve.
 With a prior, scene statistics and from them parameters come before the gather.
 """
 
@@ -27,6 +27,7 @@ from renderer.passes.screen_space_indirect import BLOCK as SCREEN_SPACE_BLOCK
 from renderer.passes.screen_space_indirect import ScreenSpaceIndirectPass
 from renderer.passes.tone_mapping import ToneMappingPass
 from renderer.passes.virtual_point_lights import VirtualPointLightsPass
+from renderer.passes.vpl_cells import LARGEST_COUNT, VplCellsPass
 from renderer.passes.vpl_gather import VplGatherPass
 from renderer.passes.vpl_importance import VplImportancePass, importance_cells
 from renderer.passes.vpl_visibility_maps import VplVisibilityMapsPass
@@ -87,6 +88,7 @@ class Frame:
         self.virtual_point_lights = VirtualPointLightsPass(
             context, self.rsm, vpl_count, options.point_table, options.rsm_filtering, cells
         )
+        self._vpl_cells: VplCellsPass | None = None
         self._direct_light = DirectLightPass(context, rsm_resolution)
         self._hierarchy = hierarchy
         self.vpl_visibility_maps: VplVisibilityMapsPass | None = None
@@ -127,7 +129,7 @@ class Frame:
         if parameters.density_importance > 0.0:
             self._vpl_importance.draw(camera, self.gbuffer, self.rsm)
         self._vpl_importance.bind()
-        self.virtual_point_lights.draw(self.rsm, records.moment_origin, table_rotation)
+        self._place_vpls(records, table_rotation, parameters.density_relaxation)
         self._cast_visibility_maps()
         self._direct_light.draw(
             camera, self.gbuffer, self.rsm, len(view.lights), accumulated, self.direct_irradiance
@@ -167,6 +169,19 @@ class Frame:
     def camera(self, view: View) -> CameraUniforms:
         """The view's camera as the shaders know it."""
         return camera_uniforms(view.camera, self.size, self._scene.bounds())
+
+    def _place_vpls(
+        self, records: LightRecords, table_rotation: tuple[float, float], relaxation: int
+    ) -> None:
+        vpls = self.virtual_point_lights
+        if relaxation == 0 or vpls.count > LARGEST_COUNT:
+            vpls.draw(self.rsm, records.moment_origin, table_rotation)
+            return
+        if self._vpl_cells is None:
+            self._vpl_cells = VplCellsPass(self._context, vpls.count)
+        vpls.draw(self.rsm, records.moment_origin, table_rotation, self._vpl_cells.sample_count)
+        assert vpls.samples is not None
+        self._vpl_cells.draw(vpls.samples, vpls.virtual_point_lights, relaxation)
 
     def _cast_visibility_maps(self) -> None:
         if self.vpl_visibility_maps is not None and self._hierarchy is not None:

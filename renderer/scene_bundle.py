@@ -112,6 +112,8 @@ def left_out(config: TunedConfig) -> tuple[str, ...]:
         sentences.append("The screen-space near field is drawn by the runtime alone")
     if config.parameters.density_importance > 0.0:
         sentences.append("Outside the runtime VPLs are placed by flux alone: the same mean, more noise")
+    if config.parameters.density_relaxation > 0:
+        sentences.append("Outside the runtime VPLs are points, not cells: the same mean, more noise")
     return tuple(sentences)
 
 

@@ -23,13 +23,15 @@ def test_the_count_for_an_error_is_read_off_the_curve():
 def test_rows_and_files(tmp_path):
     """Fitted with half the error: half as many VPLs as uniform, 4 times the error of 256 default ones."""
     curves = [
-        SceneCurves("room", power_law(2.0), power_law(2.0), power_law(1.0), {2: 0.01}, ArtistParameters()),
-        SceneCurves("hall", power_law(2.0), power_law(2.0), power_law(1.0), {2: 0.01}, ArtistParameters()),
+        SceneCurves("room", *[power_law(2.0)] * 3, power_law(1.0), {2: 0.01}, ArtistParameters()),
+        SceneCurves("hall", *[power_law(2.0)] * 3, power_law(1.0), {2: 0.01}, ArtistParameters()),
     ]
     rows = {row.name: row for row in curve_rows(curves)}
     for name in ("vpls_for_same_error.room", "vpls_for_same_error.hall", "vpls_for_same_error"):
         assert rows[name].ratio == pytest.approx(0.5)
     assert rows["tuned_32_over_default_256"].value == pytest.approx(4.0)
+    assert rows["tuned_32_over_cells_256"].value == pytest.approx(4.0)
+    assert rows["tuned_vpls_for_default_256.room"].value == pytest.approx(128.0)
     assert rows["tuned_32_a_pixel_2x2_over_default_256"].value == pytest.approx(0.01 / (2.0 / 256))
     assert np.isfinite([row.ratio for row in rows.values()]).all()
     write_curves(tmp_path, curves)

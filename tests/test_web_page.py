@@ -197,13 +197,14 @@ def test_it_is_legible_in_the_dark_and_on_a_small_screen(opened, scheme):
 
 def test_names_cannot_break_out_and_what_is_left_out_is_said(opened):
     name = "</script><script>document.title='broken'</script>"
-    parameters = dataclasses.replace(CONFIG.parameters, screen_space_strength=1.0)
+    parameters = dataclasses.replace(CONFIG.parameters, screen_space_strength=1.0, density_relaxation=1)
     config = TunedConfig(parameters, {"scene": name})
     scene = dataclasses.replace(textured_room(), name=name)
     page = opened(page_text(scene, web_view("spot", (16, 12)), config))
     assert page.title() == f"{name} – VPLtune"
     assert page.inner_text("h1") == name
     assert "near field is drawn by the runtime alone" in page.inner_text("#note")
+    assert "VPLs are points, not cells" in page.inner_text("#note")
 
 
 def test_the_command_writes_one_file(tmp_path, capfd):

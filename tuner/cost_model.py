@@ -179,6 +179,7 @@ def _measure(runtime: Runtime, views: Sequence[View], config: TunedConfig) -> Co
 def _path(renderer: str, scene: Scene, views: Sequence[View], config: TunedConfig) -> Path:
     parts = [_FORMAT, renderer, scene_digest(scene), config.visibility]
     parts += [config.parameters.density_importance > 0.0, config.parameters.screen_space_strength > 0.0]
+    parts += [config.parameters.density_relaxation]
     for view in views:
         parts += [view.size, view.camera.to_world.tolist(), view.camera.yfov]
         parts += [

@@ -21,6 +21,7 @@ from tuner.cost_model import (
 )
 from tuner.fit_density import (
     HELD_OUT_ROTATIONS,
+    RELAXATION,
     DensityFit,
     fit_density,
     rotated_views,
@@ -108,7 +109,9 @@ class FrameBudget:
         self._seed = seed
         self._views = tuple(view for view in prepared.views if view.view.split == "fitted")
         self._timed = tuple(replace(view.view, size=frame_size) for view in self._views)
-        guessed = replace(start.parameters, density_importance=GUESSED_IMPORTANCE)
+        guessed = replace(
+            start.parameters, density_importance=GUESSED_IMPORTANCE, density_relaxation=RELAXATION
+        )
         self._start = replace(start, parameters=guessed)
         self.costs: CostModel = measured_cost_model(
             prepared.scene, self._timed, self._start, prepared.runtime.context, progress

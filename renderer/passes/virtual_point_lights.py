@@ -3,7 +3,7 @@
 import moderngl
 
 from renderer import buffer_bindings
-from renderer.point_table import PointTable, point_table
+from renderer.point_table import PointTable, point_table, r2_sequence
 from renderer.render_targets import ReflectiveShadowMap
 from renderer.shader_library import load_compute, set_uniforms
 
@@ -49,16 +49,20 @@ class VirtualPointLightsPass:
         }
         self.frame_statistics = context.buffer(reserve=FRAME_STATISTICS_BYTES)
         self.virtual_point_lights = context.buffer(reserve=count * VPL_BYTES)
+        self.samples: moderngl.Buffer | None = None
+        self._sample_table: moderngl.Buffer | None = None
 
     def draw(
         self,
         rsm: ReflectiveShadowMap,
         moment_origin: tuple[float, float, float],
         table_rotation: tuple[float, float],
+        sample_count: int = 0,
     ) -> None:
         """Place the VPLs, by the densities γ and η and the importance that are bound: chance ∝ flux^γ · F.
 
-        `table_rotation` shifts the point table on its torus, in [0, 1)².
+        `table_rotation` shifts the point table on its torus, in [0, 1)². Where `sample_count` is not 0, so
+        many more are placed in `samples`, from the R2 sequence, which hold all light once more.
         """
         for binding, buffer in self._buffers.items():
             buffer.bind_to_storage_buffer(binding)
@@ -72,16 +76,26 @@ class VirtualPointLightsPass:
         self._marginal_density.run(1)
         context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT)
         rsm.bind(self._placement, 0)
-        set_uniforms(
-            self._placement,
-            vpl_count=self.count,
-            rows=rsm.rows,
-            table_rotation=table_rotation,
-        )
-        self._placement.run(-(-self.count // 64))
-        context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT)
+        set_uniforms(self._placement, rows=rsm.rows, table_rotation=table_rotation)
+        self._place(self.count)
+        if sample_count > 0:
+            self._place_samples(sample_count)
 
     def bind(self) -> None:
         """Bind what the gather reads."""
         self.frame_statistics.bind_to_storage_buffer(buffer_bindings.FRAME_STATISTICS)
         self.virtual_point_lights.bind_to_storage_buffer(buffer_bindings.VIRTUAL_POINT_LIGHTS)
+
+    def _place(self, count: int) -> None:
+        set_uniforms(self._placement, vpl_count=count)
+        self._placement.run(-(-count // 64))
+        self._context.memory_barrier(self._context.SHADER_STORAGE_BARRIER_BIT)
+
+    def _place_samples(self, count: int) -> None:
+        if self.samples is None or self._sample_table is None:
+            self.samples = self._context.buffer(reserve=count * VPL_BYTES)
+            self._sample_table = self._context.buffer(r2_sequence(count).tobytes())
+        self._sample_table.bind_to_storage_buffer(buffer_bindings.POINT_TABLE)
+        self.samples.bind_to_storage_buffer(buffer_bindings.VIRTUAL_POINT_LIGHTS)
+        self._place(count)
+        self.bind()

@@ -104,6 +104,17 @@ def test_parameters_that_follow_the_scene_are_not_read_back(gl_context, calls):
     assert calls == {"Buffer.read": 1}
 
 
+def test_cells_are_not_read_back(gl_context, calls):
+    """VPLs are moved to the middle of their cells on the GPU, and all buffers are there after one frame."""
+    config = TunedConfig(ArtistParameters(vpl_count=64, density_relaxation=2), visibility="maps")
+    runtime = Runtime(colored_room(), config, context=gl_context, rsm_resolution=64)
+    runtime.draw(everything_view())
+    calls.clear()
+    for _ in range(5):
+        runtime.draw(everything_view())
+    assert not calls
+
+
 def test_the_first_frame_reads_nothing_either(gl_context, calls):
     """Only the choice of a light path waits for the GPU, to time it; no data comes back."""
     runtime = Runtime(colored_room(), "default", context=gl_context, rsm_resolution=64)

@@ -19,7 +19,9 @@ from renderer.parameter_block import (
 # No two values alike, so that a swap of two fields shows.
 PARAMETERS = ArtistParameters(
     **{
-        spec.name: 12345 if spec.whole_number else spec.low + (spec.high - spec.low) / (3.0 + index)
+        spec.name: (spec.low + spec.high) // 3
+        if spec.whole_number
+        else spec.low + (spec.high - spec.low) / (3.0 + index)
         for index, spec in enumerate(ARTIST_PARAMETERS)
     }
 )

@@ -28,7 +28,7 @@ def room(gl_context) -> tuple[Runtime, CapturedView]:
 
 @pytest.mark.slow
 def test_few_vpls_are_better_where_they_were_not_fitted_to(room):
-    """On held-out rotations, 24 fitted VPLs beat 24 of the default by a third, and 48 uniform ones."""
+    """On held-out rotations, 24 fitted VPLs have a third of the default's error, and beat 48 uniform ones."""
     runtime, view = room
     fit = fit_density(runtime, (view,), FEW, rotations=table_rotations(4, 0))
     rotations = table_rotations(16, 0, held_out=True)
@@ -37,10 +37,11 @@ def test_few_vpls_are_better_where_they_were_not_fitted_to(room):
         return float(rotation_errors(runtime, (view,), parameters, rotations).mean())
 
     tuned = error(fit.parameters)
-    assert tuned < 0.67 * error(FEW)
-    assert tuned < error(ArtistParameters(vpl_count=48, density_exponent=0.0))
+    assert tuned < 0.33 * error(FEW)
+    assert tuned < 0.4 * error(ArtistParameters(vpl_count=48, density_exponent=0.0))
     assert fit.parameters.vpl_count == FEW.vpl_count
-    assert fit.descent.loss == min(trial.loss for trial in fit.trials)
+    # The maps are fitted after the trials.
+    assert fit.descent.loss <= min(trial.loss for trial in fit.trials)
 
 
 @pytest.mark.slow
@@ -77,13 +78,13 @@ def test_the_response_surface_finds_the_bottom_of_a_bowl():
             for importance in (0.0, 0.5, 1.0):
                 bowl = (exponent - target[0]) ** 2 + 2.0 * (importance - target[1]) ** 2
                 loss = float(np.exp(bowl) * (1.0 + 0.02 * random.standard_normal()))
-                trials.append(DensityTrial(exponent, importance, loss))
+                trials.append(DensityTrial(exponent, importance, 4, loss))
         assert np.abs(np.array(response_minimum(trials)) - target).max() < 0.15
 
 
 def test_losses_below_zero_do_not_break_the_surface():
     """Free of the reference's noise, a perfect fit may end a little below 0."""
-    trials = [DensityTrial(x, y, x**2 + y**2 - 0.001) for x in (0.0, 0.5, 1.0) for y in (0.0, 0.5, 1.0)]
+    trials = [DensityTrial(x, y, 4, x**2 + y**2 - 0.001) for x in (0.0, 0.5, 1.0) for y in (0.0, 0.5, 1.0)]
     assert response_minimum(trials) == (0.0, 0.0)
 
 

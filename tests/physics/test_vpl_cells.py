@@ -1,0 +1,164 @@
+"""VPLs with the light of a cell: the same energy, on the surface, evener, and the same in any unit.
+
+Without visibility, which has nothing to do with where they stand.
+"""
+
+import numpy as np
+import pytest
+from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
+from converged_views import corner_view
+
+from renderer.artist_parameters import ArtistParameters
+from renderer.passes.vpl_cells import LARGEST_COUNT
+from renderer.runtime import Runtime
+from renderer.scene import Camera, Light, look_at, scaled
+from renderer.tuned_config import TunedConfig
+from renderer.views import View, scaled_view
+
+
+def runtime_with(gl_context, scene=None, resolution=256, **parameters) -> Runtime:
+    chosen = {**ArtistParameters().as_dict(), "vpl_count": 32, "density_relaxation": 4, **parameters}
+    config = TunedConfig(ArtistParameters(**chosen), visibility="none")
+    return Runtime(scene or colored_room(), config, rsm_resolution=resolution, context=gl_context)
+
+
+@pytest.mark.parametrize("light", ROOM_LIGHTS)
+@pytest.mark.parametrize("vpl_count", [1, 32, 300])
+def test_energy_is_kept(gl_context, light, vpl_count):
+    """All light of the samples is in some cell: total flux is that of points.
+
+    With γ = 1, where every sample has the same share of it; to 0.1 %, what filtered colours leave to chance.
+    """
+    relaxed, points = (
+        runtime_with(gl_context, vpl_count=count, density_relaxation=relaxation).capture(
+            room_view(light, (8, 8))
+        )
+        for count, relaxation in ((vpl_count, 3), (4096, 0))
+    )
+    np.testing.assert_allclose(relaxed.vpl_flux.sum(axis=0), points.vpl_flux.sum(axis=0), rtol=1e-3)
+    assert relaxed.scene_length == points.scene_length
+
+
+@pytest.mark.parametrize("light", ROOM_LIGHTS)
+def test_vpls_stand_on_surfaces(gl_context, light):
+    """The middle of a cell is on a plane of the room, with that plane's normal; none goes round a corner."""
+    captured = runtime_with(gl_context, vpl_count=200).capture(room_view(light, (8, 8)))
+    lit = captured.vpl_flux.sum(axis=1) > 0.0
+    assert lit.mean() > 0.98
+    position, normal = captured.vpl_position_world[lit], captured.vpl_normal_world[lit]
+    on_wall = np.abs(np.abs(position) - 1.0).min(axis=1) < 2e-5
+    board = colored_room().meshes[-1]
+    on_board = np.abs((position - board.positions[0]) @ board.normals[0]) < 2e-5
+    assert (on_wall | on_board).all()
+    assert np.abs(position).max() < 1.0 + 2e-5
+    along = np.abs(np.sum(position * normal, axis=1))
+    np.testing.assert_allclose(along[on_wall & ~on_board], 1.0, atol=1e-4)
+
+
+def test_one_cell_is_a_disc_of_the_same_spread(gl_context):
+    """One VPL for a lit square of side a stands at its centre, with twice its variance, ℓ² = 2 · 2 · a²/12.
+
+    Tolerance 1 %: the square's edges fall between RSM texels.
+    """
+    side = 0.8
+    scene = scene_of([quad((0.1, 0, 0.2), (0, 0, side), (side, 0, 0))], [(0.5, 0.5, 0.5)])
+    sun = Light("directional", np.full(3, 2.0), direction_world=np.array([0.0, -1.0, 0.0]))
+    view = View(
+        "square", "fitted", (8, 8), Camera(look_at(np.array([0.5, 2.0, 0.6]), np.zeros(3)), 0.8), (sun,)
+    )
+    captured = runtime_with(gl_context, scene, vpl_count=1).capture(view)
+    np.testing.assert_allclose(captured.vpl_position_world[0], (0.5, 0.0, 0.6), atol=5e-3)
+    assert captured.vpl_footprint[0] == pytest.approx(side / np.sqrt(3.0), rel=1e-2)
+
+
+def test_a_cell_around_a_hole_stands_beside_it(gl_context):
+    """The middle of a lit frame is empty: its one VPL is on the frame all the same."""
+    bars = [
+        quad((-1, 0, -1), (0, 0, 2), (0.2, 0, 0)), quad((0.8, 0, -1), (0, 0, 2), (0.2, 0, 0)),
+        quad((-0.8, 0, -1), (0, 0, 0.2), (1.6, 0, 0)), quad((-0.8, 0, 0.8), (0, 0, 0.2), (1.6, 0, 0)),
+    ]  # fmt: skip
+    sun = Light("directional", np.full(3, 2.0), direction_world=np.array([0.0, -1.0, 0.0]))
+    view = View(
+        "frame", "fitted", (8, 8), Camera(look_at(np.array([0.0, 3.0, 0.1]), np.zeros(3)), 0.8), (sun,)
+    )
+    captured = runtime_with(gl_context, scene_of(bars, [(0.5, 0.5, 0.5)]), vpl_count=1).capture(view)
+    assert np.abs(captured.vpl_position_world[0, [0, 2]]).max() > 0.75
+
+
+@pytest.mark.parametrize("light", ["spot", "directional"])
+def test_less_error_than_points(gl_context, light):
+    """Near a corner, against 16,384 points: at most two thirds of the squared error of as many points."""
+    view = corner_view(light)
+    truth = runtime_with(gl_context, vpl_count=16384, density_relaxation=0).render(view, "irradiance")
+    error = {}
+    for count in (32, 256):
+        for relaxation in (0, 4):
+            runtime = runtime_with(gl_context, vpl_count=count, density_relaxation=relaxation)
+            random = np.random.default_rng(5)
+            frames = [runtime.capture(view, tuple(random.random(2))).indirect_irradiance for _ in range(6)]
+            error[count, relaxation] = np.mean((np.array(frames) - truth) ** 2)
+    assert error[32, 4] < 0.67 * error[32, 0], error
+    assert error[256, 4] < 0.67 * error[256, 0], error
+
+
+@pytest.mark.parametrize("light", ROOM_LIGHTS)
+def test_more_cells_keep_the_mean(gl_context, light):
+    """Doubling N moves the mean irradiance by less than 1 %."""
+    view = room_view(light, (48, 36))
+    means = []
+    for count in (512, 1024):
+        captured = runtime_with(gl_context, vpl_count=count).capture(view)
+        means.append(captured.indirect_irradiance[captured.valid].mean())
+    assert means[1] == pytest.approx(means[0], rel=1e-2)
+
+
+@pytest.mark.parametrize("factor", [0.01, 100.0])
+def test_cells_have_no_unit(gl_context, factor):
+    """Scene, camera and light scaled together: the same picture, to 1e-3 relative RMSE."""
+    view = room_view("spot", (32, 24))
+    picture = runtime_with(gl_context).render_radiance(view)
+    grown = runtime_with(gl_context, scaled(colored_room(), factor)).render_radiance(
+        scaled_view(view, factor)
+    )
+    assert np.sqrt(np.mean((grown - picture) ** 2) / np.mean(picture**2)) < 1e-3
+
+
+def test_frames_repeat_bitwise(gl_context):
+    runtime = runtime_with(gl_context, density_importance=0.7)
+    first = runtime.capture(room_view("point", (32, 24)))
+    runtime.capture(room_view("spot", (32, 24)))
+    again = runtime.capture(room_view("point", (32, 24)))
+    np.testing.assert_array_equal(again.vpl_position_world, first.vpl_position_world)
+    np.testing.assert_array_equal(again.indirect_irradiance, first.indirect_irradiance)
+
+
+def test_dark_and_very_many(gl_context):
+    """Without light all is black; beyond the largest count VPLs are points as they were."""
+    dark = runtime_with(gl_context).capture(room_view(None, (16, 12)))
+    assert not dark.indirect_irradiance.any() and np.isfinite(dark.vpl_position_world).all()
+    many = [
+        runtime_with(gl_context, vpl_count=LARGEST_COUNT + 1, density_relaxation=relaxation)
+        .capture(room_view("spot", (8, 8)))
+        .vpl_position_world
+        for relaxation in (0, 4)
+    ]
+    np.testing.assert_array_equal(*many)
+
+
+def test_cells_steady_a_swept_light(gl_context):
+    """Under a light that creeps, irradiance from cells jumps no more from frame to frame than from points."""
+    changes = {}
+    for relaxation in (0, 4):
+        runtime = runtime_with(gl_context, vpl_count=64, density_relaxation=relaxation)
+        pictures = []
+        for step in range(16):
+            place = np.array([0.1 + 0.004 * step, 0.9, 0.05])
+            light = Light("spot", np.full(3, 4.0), place, np.array([0.0, -1.0, 0.0]), 0.3, 0.85)
+            camera = room_view("spot").camera
+            pictures.append(
+                runtime.render(View("s", "fitted", (32, 24), camera, (light,)), "irradiance").copy()
+            )
+        second = np.diff(np.array(pictures, np.float64), n=2, axis=0)
+        changes[relaxation] = np.abs(second).mean() / np.mean(pictures)
+    print(changes)
+    assert changes[4] < changes[0], changes

@@ -51,7 +51,8 @@ def _unoccluded(traced: TracedScene, tables: list, pair, count: int) -> Bool[np.
     w = traced.wavefront
     receivers, normals, vpls, vpl_normals = tables
     lane = w.lanes(count)
-    first, row_length = w.take(pair, lane * 0), w.take(pair, lane * 0 + 1)
+    # Lanes that fill up the last packet look up 0, and an integer division by it would end the process.
+    first, row_length = w.take(pair, lane * 0), w.maximum(w.take(pair, lane * 0 + 1), 1)
     receiver, vpl = first + lane // row_length, lane % row_length
     origin = w.take_vector(receivers, receiver)
     # Not of unit length: the segment ends at 1.

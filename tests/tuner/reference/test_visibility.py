@@ -60,6 +60,18 @@ def test_points_of_one_convex_room_see_each_other(shapes):
     ).any()
 
 
+@pytest.mark.parametrize(("receivers", "vpls"), [(1, 1), (3, 5), (7, 9), (1, 17)])
+def test_pairs_that_fill_no_whole_packet(screen_between_floors, receivers, vpls):
+    """A processor takes 4 to 16 lanes at once; those past the last pair must not end the process."""
+    left = np.linspace(-1.9, -0.1, receivers)[:, None] * [1.0, 0.0, 0.0]
+    above = np.linspace(-1.9, -0.1, vpls)[:, None] * [1.0, 0.0, 0.0] + 2.0 * UP
+    got = ray_traced_visibility(
+        screen_between_floors, left, np.tile(UP, (receivers, 1)), above, np.tile(-UP, (vpls, 1))
+    )
+    assert got.shape == (receivers, vpls)
+    assert got.all()
+
+
 def test_nothing_asked_nothing_seen(screen_between_floors):
     none, one = np.zeros((0, 3)), np.zeros((1, 3))
     assert ray_traced_visibility(screen_between_floors, none, none, one, one).shape == (0, 1)

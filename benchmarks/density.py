@@ -19,9 +19,13 @@ from benchmarks.row import Row
 from benchmarks.scene_library import REPOSITORY, present_scenes
 from renderer.artist_parameters import ArtistParameters
 from renderer.atomic_file import write_text_whole, written_whole
+from renderer.gpu_context import create_context
 from renderer.runtime import Runtime
 from renderer.runtime_options import RuntimeOptions
+from renderer.scene_file import read_scene
 from renderer.tuned_config import TunedConfig
+from renderer.view_placement import resolve_camera_and_lights
+from renderer.views import View
 from tuner.captured_view import CapturedView
 from tuner.fit_density import RELAXATION, fit_density, rotated_views, rotation_errors, table_rotations
 from tuner.fit_falloff import fit_falloff
@@ -44,6 +48,16 @@ DEFAULT_COUNT = 256
 INTERLEAVES = (2, 4)
 ROTATIONS = 4
 """To fit to, and as many others to measure on."""
+COST_SIZE = (640, 360)
+COST_TURNS = 3
+COST_PASSES = (
+    "vpl_importance",
+    "virtual_point_lights",
+    "vpl_cells",
+    "vpl_visibility_maps",
+    "vpl_gather",
+    "interleaved_filter",
+)
 SLOPE_STEPS = 20
 """Along η, at each of which the sign of the measured slope is compared with the smooth trend's."""
 _UNFITTED = {
@@ -79,7 +93,8 @@ def rows(progress: Progress) -> list[Row]:
     names = [name for name in SCENES if name in present]
     curves = [measured_curves(name, present[name], progress) for name in names]
     write_curves(REPOSITORY / "out" / "density", curves)
-    return [*curve_rows(curves), slope_row(names[0], present[names[0]], progress)]
+    made = [*curve_rows(curves), *cost_rows(present[names[0]], progress)]
+    return [*made, slope_row(names[0], present[names[0]], progress)]
 
 
 def curve_rows(curves: Sequence[SceneCurves]) -> list[Row]:
@@ -158,6 +173,41 @@ def measured_curves(name: str, path: Path, progress: Progress) -> SceneCurves:
         side: _interleaved_error(prepared, fits[FITTED_COUNT * side**2], side) for side in INTERLEAVES
     }
     return SceneCurves(name, **curves, parameters=found)
+
+
+def cost_rows(path: Path, progress: Progress) -> list[Row]:
+    """What VPLs cost from placement to picture, frames drawn in turn: with cells, against the default.
+
+    The rows `tuned_32_a_pixel_…` are to be read beside these.
+    """
+    scene = read_scene(path)
+    camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
+    view = View("cost", "fitted", COST_SIZE, camera, lights)
+    cells = ArtistParameters(density_relaxation=RELAXATION)
+    drawn = {
+        "32": (replace(cells, vpl_count=FITTED_COUNT), 1),
+        **{f"32_a_pixel_{s}x{s}": (replace(cells, vpl_count=FITTED_COUNT * s**2), s) for s in INTERLEAVES},
+        "default": (ArtistParameters(vpl_count=DEFAULT_COUNT), 1),
+    }
+    best = dict.fromkeys(drawn, np.inf)
+    with create_context() as context:
+        runtimes = {
+            name: Runtime(
+                scene,
+                TunedConfig(parameters, visibility="maps"),
+                RuntimeOptions(interleave=side),
+                context=context,
+            )
+            for name, (parameters, side) in drawn.items()
+        }
+        for turn in range(COST_TURNS):
+            progress("cost", turn / COST_TURNS)
+            for name, runtime in runtimes.items():
+                passes = runtime.pass_milliseconds(view, 1)
+                best[name] = min(best[name], sum(passes.get(each, 0.0) for each in COST_PASSES))
+    against = f"default at {DEFAULT_COUNT} VPLs, {COST_SIZE[0]}x{COST_SIZE[1]}"
+    default = best.pop("default")
+    return [Row(f"cost_{name}", taken, "ms", against, default) for name, taken in best.items()]
 
 
 def count_for_error(curve: Curve, error: float) -> float:

@@ -34,6 +34,7 @@ from renderer.passes.vpl_visibility_maps import VplVisibilityMapsPass
 from renderer.ray_hierarchy import RayHierarchy
 from renderer.render_targets import (
     LightAccumulation,
+    create_direction_target,
     create_display_target,
     create_gbuffer,
     create_irradiance_target,
@@ -103,8 +104,11 @@ class Frame:
         self._vpl_gather = VplGatherPass(context, options.interleave, self._visibility)
         self._interleaved_filter: InterleavedFilterPass | None = None
         if options.interleave > 1:
+            self._interleaved_direction = create_direction_target(context, size)
             self._pixel_list = create_pixel_list(context, size)
-            self._interleaved_filter = InterleavedFilterPass(context, options.interleave, refine=True)
+            self._interleaved_filter = InterleavedFilterPass(
+                context, options.interleave, refine=True, relight=True, shadowed=map_size > 0
+            )
         self._screen_space_indirect = ScreenSpaceIndirectPass(context, size, rsm_resolution, cells)
         self._screen_space_filter = InterleavedFilterPass(context, SCREEN_SPACE_BLOCK, add_base=True)
         self._material_resolve = MaterialResolvePass(context)
@@ -199,9 +203,16 @@ class Frame:
         if self._interleaved_filter is None:
             self._vpl_gather.draw(camera, self.gbuffer, count, picture)
             return
-        self._vpl_gather.draw(camera, self.gbuffer, count, self._interleaved_irradiance)
+        self._vpl_gather.draw(
+            camera, self.gbuffer, count, self._interleaved_irradiance, self._interleaved_direction
+        )
         self._interleaved_filter.draw(
-            camera, self.gbuffer, self._interleaved_irradiance, picture, pixel_list=self._pixel_list
+            camera,
+            self.gbuffer,
+            self._interleaved_irradiance,
+            picture,
+            direction=self._interleaved_direction,
+            pixel_list=self._pixel_list,
         )
         self._vpl_gather.refine(camera, self.gbuffer, count, self._pixel_list, picture)
 

@@ -100,6 +100,11 @@ def create_irradiance_target(context: moderngl.Context, size: tuple[int, int]) -
     return _nearest(context.texture(size, 4, dtype="f4"))
 
 
+def create_direction_target(context: moderngl.Context, size: tuple[int, int]) -> moderngl.Texture:
+    """A picture of unit vectors in the world: octahedral, 2×16 bit."""
+    return _nearest(context.texture(size, 2, dtype="nu2"))
+
+
 @dataclass(frozen=True)
 class LightAccumulation:
     """The sum of the dynamic lights' irradiance at every pixel."""

@@ -4,6 +4,7 @@
 // The window is n + 1 pixels wide, n = INTERLEAVE, its outer pixels counting half, so that it is centred and
 // each of the n² subsets counts once. Pixels on another surface are left out, by plane distance, told in pixel
 // footprints so that no length enters, and by normal. Weights are divided by their sum: a constant stays itself.
+// With RELIGHT, a neighbour's irradiance is turned to the pixel's normal first, by the direction it comes from.
 // Near an edge, part of the subsets is missing; with REFINE, pixels where what is there is too few or too
 // uneven to say what is missing go into the list for a full gather.
 #include "common/gbuffer.glsl"
@@ -12,6 +13,7 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 uniform sampler2D interleaved;
+uniform sampler2D direction;  // with RELIGHT: of the light, octahedral
 uniform sampler2D base;  // with ADD_BASE: added to the result
 
 layout(rgba32f, binding = 0) writeonly uniform image2D out_irradiance;
@@ -19,9 +21,9 @@ layout(rgba32f, binding = 0) writeonly uniform image2D out_irradiance;
 const int REACH = INTERLEAVE / 2;
 const int TILE = 8 + 2 * REACH;
 
-shared vec4 tile_irradiance[TILE * TILE];  // alpha 0: no surface
-shared vec3 tile_position[TILE * TILE];    // from the eye, which keeps float32 precise near it
+shared vec4 tile_irradiance[TILE * TILE];  // alpha: distance along the camera's axis, 0 without a surface
 shared vec3 tile_normal[TILE * TILE];
+shared vec3 tile_light[TILE * TILE];  // times a normal: irradiance on it, of that on the pixel's own
 
 void load_tile(ivec2 size) {
     ivec2 corner = ivec2(gl_WorkGroupID.xy) * 8 - REACH;
@@ -30,46 +32,63 @@ void load_tile(ivec2 size) {
         ivec2 inside = clamp(pixel, ivec2(0), size - 1);
         Receiver receiver = gbuffer_receiver(inside);
         bool usable = receiver.valid && pixel == inside;
-        tile_irradiance[i] = vec4(texelFetch(interleaved, inside, 0).rgb, usable ? 1.0 : 0.0);
-        tile_position[i] = receiver.position_world - camera_to_world[3].xyz;
+        float depth = usable ? near_plane / texelFetch(gbuffer_depth, inside, 0).r : 0.0;
+        tile_irradiance[i] = vec4(texelFetch(interleaved, inside, 0).rgb, depth);
         tile_normal[i] = receiver.normal_world;
+        if (RELIGHT != 0) {
+            vec3 light = octahedral_decode(texelFetch(direction, inside, 0).rg);
+            tile_light[i] = light / max(dot(light, receiver.normal_world), LEAST_COSINE);
+        }
     }
     barrier();
 }
 
-// Irradiance weighed over the window, the sum of weights (at most n²), and the weighed square of its mean channel.
 struct Window {
-    vec4 sum;
-    float square;
+    vec4 sum;     // irradiance of neighbours on the pixel's surface, weighed, and the sum of weights (at most n²)
+    vec3 around;  // of neighbours on any surface: weighed square, mean channel, and the sum of weights
 };
 
-Window weigh(int center, float plane_tolerance) {
-    Window window = Window(vec4(0.0), 0.0);
+Window weigh(int center, vec2 ndc, vec2 ndc_step) {
+    Window window = Window(vec4(0.0), vec3(0.0));
     vec3 normal = tile_normal[center];
-    float plane = dot(normal, tile_position[center]);
+    float depth = tile_irradiance[center].a;
+    // Height over the pixel's plane is depth times what is linear in the picture, less the same at the pixel.
+    vec3 normal_camera = normal * mat3(camera_to_world);
+    float slope = dot(normal_camera, vec3(ndc * tan_half_fov, -1.0));
+    vec2 slope_step = normal_camera.xy * tan_half_fov * ndc_step;
+    float plane_tolerance = PLANE_TOLERANCE * tan_half_fov.y * ndc_step.y * depth;
     for (int y = -REACH; y <= REACH; ++y) {
         for (int x = -REACH; x <= REACH; ++x) {
             int tap = center + y * TILE + x;
-            bool same_surface = abs(dot(normal, tile_position[tap]) - plane) < plane_tolerance
-                             && dot(normal, tile_normal[tap]) > NORMAL_COSINE;
+            vec4 neighbour = tile_irradiance[tap];
+            vec3 irradiance = neighbour.rgb;
+            if (RELIGHT != 0) {
+                irradiance *= clamp(dot(normal, tile_light[tap]), 0.0, LARGEST_RELIGHTING);
+            }
+            float height = neighbour.a * (slope + dot(slope_step, vec2(x, y))) - depth * slope;
+            float same_surface = step(abs(height), plane_tolerance)
+                               * step(NORMAL_COSINE, dot(normal, tile_normal[tap]));
             float weight = (abs(x) == REACH ? 0.5 : 1.0) * (abs(y) == REACH ? 0.5 : 1.0);
-            weight = same_surface ? weight * tile_irradiance[tap].a : 0.0;
-            vec3 irradiance = tile_irradiance[tap].rgb;
-            float level = (irradiance.r + irradiance.g + irradiance.b) / 3.0;
-            window.sum += weight * vec4(irradiance, 1.0);
-            window.square += weight * level * level;
+            weight = neighbour.a > 0.0 ? weight : 0.0;
+            float level = dot(irradiance, vec3(1.0 / 3.0));
+            window.sum += weight * same_surface * vec4(irradiance, 1.0);
+            window.around += weight * vec3(level * level, level, 1.0);
         }
     }
     return window;
 }
 
+// Whether the subsets that are absent from the window may change its mean too much. A mean of n of N things has
+// the variance σ²/n · (1 - n/N) (Cochran 1977, Eq. 2.20). σ² is told from neighbours on any surface: the subset
+// with a VPL close by may be just the one that is absent.
 bool needs_full_gather(Window window) {
-    float weight = window.sum.a;
-    float level = (window.sum.r + window.sum.g + window.sum.b) / (3.0 * weight);
-    // Of the mean: what the subsets' spread leaves uncertain, were they drawn at random.
-    float variance = (window.square / weight - level * level) / weight;
-    return weight < FEWEST_SUBSETS * float(INTERLEAVE * INTERLEAVE)
-        || variance > LARGEST_VARIANCE * level * level;
+    float count = window.sum.a;
+    float level = dot(window.sum.rgb, vec3(1.0 / 3.0)) / count;
+    vec3 around = window.around / window.around.z;
+    float variance = around.x - 2.0 * level * around.y + level * level;
+    float absent = 1.0 - count / float(INTERLEAVE * INTERLEAVE);
+    float error = (variance + LEAST_VARIANCE * level * level) / count * (absent + LEAST_ABSENT);
+    return error > LARGEST_ERROR * level * level;
 }
 
 void main() {
@@ -84,9 +103,8 @@ void main() {
         imageStore(out_irradiance, pixel, vec4(0.0));
         return;
     }
-    float view_depth = near_plane / texelFetch(gbuffer_depth, pixel, 0).r;
-    float pixel_footprint = 2.0 * tan_half_fov.y * view_depth / float(size.y);
-    Window window = weigh(center, PLANE_TOLERANCE * pixel_footprint);
+    vec2 ndc_step = 2.0 / vec2(size);
+    Window window = weigh(center, (vec2(pixel) + 0.5) * ndc_step - 1.0, ndc_step);
     if (REFINE != 0 && needs_full_gather(window)) {
         append_pixel(pixel);
     }

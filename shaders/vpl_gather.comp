@@ -2,6 +2,8 @@
 // Interleaved sampling (Keller and Heidrich 2001): the pixels of an n×n block, n = INTERLEAVE, share the VPLs
 // out among themselves, n² times as bright. A workgroup takes pixels of one place in their blocks, so that all
 // of its pixels read the same VPLs (Segovia et al. 2006, done here by arithmetic on the pixel's index).
+// With it goes the direction that the light comes from, so that the filter can tell what a pixel's share would
+// be on its neighbours' normals.
 // With LISTED_PIXELS, the pixels are those of the list, for which sharing did not do.
 #include "common/artist_parameters.glsl"
 #include "common/gbuffer.glsl"
@@ -22,6 +24,9 @@ layout(std430, binding = VIRTUAL_POINT_LIGHTS_BINDING) readonly buffer VirtualPo
 };
 
 layout(rgba32f, binding = 0) writeonly uniform image2D out_irradiance;
+#if INTERLEAVE > 1
+layout(rg16, binding = 1) writeonly uniform image2D out_direction;  // octahedral
+#endif
 
 uniform int vpl_count;
 
@@ -51,6 +56,7 @@ void main() {
 #endif
     Receiver receiver = gbuffer_receiver(clamp(pixel, ivec2(0), size - 1));
     vec3 irradiance = vec3(0.0);
+    vec3 vector_irradiance = vec3(0.0);  // of the sum of channels: times a normal, irradiance on it
     for (int start = first; start < end; start += 64) {
         int lane = int(gl_LocalInvocationIndex);
         if (start + lane < end) {
@@ -59,21 +65,33 @@ void main() {
         barrier();
         int count = min(64, end - start);
         for (int i = 0; i < count; ++i) {
-            vec3 unoccluded = vpl_irradiance(
-                receiver.position_world, receiver.normal_world, batch[i], scene_length, parameters);
+            VirtualPointLight vpl = batch[i];
+            vec3 to_vpl = vpl.position_footprint.xyz - receiver.position_world;
+            float cosine = max(dot(receiver.normal_world, to_vpl), 0.0);
+            float falloff = vpl_falloff(to_vpl, vpl, scene_length, parameters);
 #if VISIBILITY_MAP_SIZE > 0
             // About half of all pairs face away from each other, and need no look at the map.
-            if (any(greaterThan(unoccluded, vec3(0.0)))) {
-                unoccluded *= vpl_visibility(
-                    receiver.position_world, receiver.normal_world, batch[i],
+            if (cosine * falloff > 0.0) {
+                falloff *= vpl_visibility(
+                    receiver.position_world, receiver.normal_world, vpl,
                     (start + i) * (VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE), scene_length, visibility);
             }
 #endif
-            irradiance += unoccluded;
+            irradiance += vpl.flux.rgb * (cosine * falloff);
+#if INTERLEAVE > 1
+            if (cosine > 0.0) {
+                vector_irradiance += to_vpl * (dot(vpl.flux.rgb, vec3(1.0)) * falloff);
+            }
+#endif
         }
         barrier();
     }
     if (pixel.x >= 0 && all(lessThan(pixel, size))) {
         imageStore(out_irradiance, pixel, receiver.valid ? vec4(irradiance, 1.0) : vec4(0.0));
+#if INTERLEAVE > 1
+        bool lit = any(notEqual(vector_irradiance, vec3(0.0)));
+        vec2 direction = octahedral_encode(lit ? vector_irradiance : receiver.normal_world);
+        imageStore(out_direction, pixel, vec4(direction, 0.0, 0.0));
+#endif
     }
 }

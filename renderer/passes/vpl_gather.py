@@ -32,9 +32,15 @@ class VplGatherPass:
         gbuffer: GBuffer,
         vpl_count: int,
         irradiance: moderngl.Texture,
+        direction: moderngl.Texture | None = None,
     ) -> None:
-        """Gather from the VPLs, with the parameters, that are bound."""
+        """Gather from the VPLs, with the parameters, that are bound.
+
+        `direction` takes where the light comes from, in an interleaved picture.
+        """
         self._bind(self._program, camera, gbuffer, vpl_count, irradiance)
+        if direction is not None:
+            direction.bind_to_image(1, read=False, write=True)
         side = 8 * self._interleave
         groups = (-(-irradiance.width // side), -(-irradiance.height // side))
         self._program.run(*groups, self._interleave**2)

@@ -8,16 +8,22 @@ struct FalloffParameters {
     float falloff_transmittance; // κ
 };
 
+// Irradiance of one watt of flux on a receiver in this direction, over its cosine times the distance: what does
+// not depend on the receiver's normal.
+float vpl_falloff(vec3 to_vpl, VirtualPointLight vpl, float scene_length, FalloffParameters parameters) {
+    // 1e-30 keeps the quotient finite where receiver and VPL coincide; both cosines are 0 there.
+    float distance_squared = max(dot(to_vpl, to_vpl), 1e-30);
+    float cosine_vpl = max(-dot(vpl.normal_area.xyz, to_vpl), 0.0);
+    float footprint = parameters.falloff_footprint * vpl.position_footprint.w;
+    float form = cosine_vpl / distance_squared / (distance_squared + footprint * footprint);
+    float transmittance = exp(-parameters.falloff_transmittance * sqrt(distance_squared) / scene_length);
+    return parameters.intensity / PI * form * transmittance;
+}
+
 vec3 vpl_irradiance(
     vec3 position_world, vec3 normal_world, VirtualPointLight vpl, float scene_length, FalloffParameters parameters
 ) {
     vec3 to_vpl = vpl.position_footprint.xyz - position_world;
-    // 1e-30 keeps the quotient finite where receiver and VPL coincide; both cosines are 0 there.
-    float distance_squared = max(dot(to_vpl, to_vpl), 1e-30);
     float cosine_receiver = max(dot(normal_world, to_vpl), 0.0);
-    float cosine_vpl = max(-dot(vpl.normal_area.xyz, to_vpl), 0.0);
-    float footprint = parameters.falloff_footprint * vpl.position_footprint.w;
-    float form = cosine_receiver * cosine_vpl / distance_squared / (distance_squared + footprint * footprint);
-    float transmittance = exp(-parameters.falloff_transmittance * sqrt(distance_squared) / scene_length);
-    return vpl.flux.rgb * (parameters.intensity / PI * form * transmittance);
+    return vpl.flux.rgb * (cosine_receiver * vpl_falloff(to_vpl, vpl, scene_length, parameters));
 }

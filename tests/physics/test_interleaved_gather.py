@@ -7,9 +7,14 @@ from scene_paths import OWN_SCENES
 
 from renderer.artist_parameters import ArtistParameters
 from renderer.camera_uniforms import camera_uniforms
-from renderer.capture import read_picture
+from renderer.capture import octahedral_decode, read_picture
 from renderer.passes.interleaved_filter import InterleavedFilterPass
-from renderer.render_targets import create_gbuffer, create_irradiance_target, create_pixel_list
+from renderer.render_targets import (
+    create_direction_target,
+    create_gbuffer,
+    create_irradiance_target,
+    create_pixel_list,
+)
 from renderer.runtime import Runtime
 from renderer.runtime_options import RuntimeOptions
 from renderer.scene import Camera, Light, look_at
@@ -69,22 +74,32 @@ def test_an_open_plane_is_the_mean_over_its_window(gl_context, interleave):
     np.testing.assert_allclose(shared[inner, inner], full[inner, inner], rtol=1e-3)
 
 
-def filtered(gl_context, interleave, picture, depth_and_normal, refine=False):
-    """A picture through the filter over a G-buffer of (near / distance, octahedral normal) per pixel."""
+def filtered(gl_context, interleave, picture, depth_and_normal, refine=False, light=None):
+    """A picture through the filter over a G-buffer of (near / distance, octahedral normal) per pixel.
+
+    `light` is the octahedral direction that it comes from; None leaves relighting out.
+    """
     height, width = picture.shape[:2]
     size = (width, height)
     gbuffer = create_gbuffer(gl_context, size)
     depth, normal = depth_and_normal
     gbuffer.depth.write(np.ascontiguousarray(depth[::-1], np.float32).tobytes())
-    gbuffer.normal.write(np.ascontiguousarray(normal[::-1] * 65535 + 0.5).astype(np.uint16).tobytes())
+    gbuffer.normal.write(octahedral_texels(normal))
     interleaved, out = (create_irradiance_target(gl_context, size) for _ in range(2))
     interleaved.write(np.ascontiguousarray(picture[::-1], np.float32).tobytes())
     camera = camera_uniforms(Camera(np.eye(4), 0.8), size, np.array([[-1.0, -1, -1], [1, 1, 1]]))
     pixel_list = create_pixel_list(gl_context, size)
-    filter_pass = InterleavedFilterPass(gl_context, interleave, refine=refine)
-    filter_pass.draw(camera, gbuffer, interleaved, out, pixel_list=pixel_list)
+    direction = create_direction_target(gl_context, size)
+    if light is not None:
+        direction.write(octahedral_texels(light))
+    filter_pass = InterleavedFilterPass(gl_context, interleave, refine=refine, relight=light is not None)
+    filter_pass.draw(camera, gbuffer, interleaved, out, direction=direction, pixel_list=pixel_list)
     listed = int(np.frombuffer(pixel_list.buffer.read(16), np.uint32)[3])
     return read_picture(out), listed
+
+
+def octahedral_texels(encoded):
+    return np.ascontiguousarray(encoded[::-1] * 65535 + 0.5).astype(np.uint16).tobytes()
 
 
 FACING = np.array([0.5, 0.5])  # the octahedral code of +Z, towards the camera
@@ -103,11 +118,10 @@ def test_a_constant_stays_itself(gl_context, interleave):
     depth[random.random(shape) < 0.2] = 0.0
     normal = np.tile(FACING, (*shape, 1))
     white = np.ones((*shape, 4))
-    out, listed = filtered(gl_context, interleave, white, (depth, normal), refine=True)
+    out, _ = filtered(gl_context, interleave, white, (depth, normal))
     seen = depth > 0.0
     np.testing.assert_allclose(out[seen], 1.0, rtol=1e-6)
     assert not out[~seen].any()
-    assert listed > 0, "salt and pepper leaves too few neighbours, which must be noticed"
 
 
 @pytest.mark.parametrize("interleave", [2, 4, 8])
@@ -139,6 +153,60 @@ def test_edges_are_kept(gl_context):
     np.testing.assert_array_equal(out[..., :3], picture[..., :3])
     mixed, _ = filtered(gl_context, 4, picture, (depth, normal))
     assert 0.3 < mixed[12, 12, 0] < 0.7
+
+
+def test_neighbours_count_as_if_they_had_the_normal(gl_context):
+    """Light from one direction on normals that differ from pixel to pixel: each keeps its own cosine.
+
+    To 2e-4, what octahedral codes of 16 bits leave of a cosine of 0.7 and more; without the direction, a
+    window's mean is far off.
+    """
+    random = np.random.default_rng(5)
+    shape = (24, 32)
+    depth, _ = flat_wall(shape)
+    normal = FACING + random.uniform(-0.15, 0.15, (*shape, 2))
+    light = np.tile(FACING + 0.1, (*shape, 1))
+    cosine = (octahedral_decode(normal.astype(np.float32)) * octahedral_decode(light.astype(np.float32))).sum(
+        -1
+    )
+    picture = np.ones((*shape, 4))
+    picture[..., :3] = cosine[..., None] * np.array([3.0, 2.0, 1.0])
+    out, _ = filtered(gl_context, 4, picture, (depth, normal), light=light)
+    np.testing.assert_allclose(out, picture, rtol=2e-4)
+    unturned, _ = filtered(gl_context, 4, picture, (depth, normal))
+    assert np.abs(unturned / picture - 1.0).max() > 0.1
+
+
+@pytest.mark.parametrize("interleave", [2, 4, 8])
+def test_pixels_on_their_own_ask_for_a_full_gather(gl_context, interleave):
+    """Each pixel of a window at a depth of its own: one subset stands for all, and nearly every pixel is listed.
+
+    But for those whose neighbours happen to be as bright.
+    """
+    random = np.random.default_rng(6)
+    side = interleave + 1
+    rows, columns = np.indices((4 * side, 4 * side)) % side
+    depth = 1e-2 * 1.1 ** -(rows * side + columns).astype(float)
+    picture = np.ones((*depth.shape, 4), np.float32)
+    picture[..., :3] = random.random((*depth.shape, 1))
+    normal = np.tile(FACING, (*depth.shape, 1))
+    out, listed = filtered(gl_context, interleave, picture, (depth, normal), refine=True)
+    np.testing.assert_allclose(out, picture, rtol=1e-6)
+    assert listed > 0.97 * depth.size
+
+
+def test_an_absent_subset_that_is_bright_elsewhere_asks_for_a_full_gather(gl_context):
+    """Along a step of depth, what the far side shows of the absent subsets decides, though it is not mixed in."""
+    shape = (32, 32)
+    depth = np.where(np.arange(32) < 16, 1.0, 2.0) * np.full(shape, 1e-4)
+    picture = np.ones((*shape, 4))
+    normal = np.tile(FACING, (*shape, 1))
+    _, even = filtered(gl_context, 4, picture, (depth, normal), refine=True)
+    picture[:, 16::4, :3] = 30.0
+    out, uneven = filtered(gl_context, 4, picture, (depth, normal), refine=True)
+    np.testing.assert_array_equal(out[:, :16, :3], 1.0)
+    assert even == 0
+    assert uneven >= 2 * 32, "the two columns beside the step lack that subset"
 
 
 def test_uneven_subsets_ask_for_a_full_gather(gl_context):

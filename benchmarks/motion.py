@@ -69,7 +69,10 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
         changes = measured_changes(clip, progress)
         truth = changes.pop("reference").mean()
         excess = {variant: float(change.mean() - truth) for variant, change in changes.items()}
-        against = f"neither snapping nor filtering (the stand-in's own change, {truth:.4f}, taken off)"
+        against = (
+            "neither snapping nor filtering, with visibility maps"
+            f" (the stand-in's own change, {truth:.4f}, taken off)"
+        )
         found += [
             Row(f"motion_{clip.name}_{variant}", value, "of mean per frame", against, excess["neither"])
             for variant, value in excess.items()
@@ -99,8 +102,7 @@ def irradiance(
     """Indirect irradiance of some frames."""
     pictures = []
     for frame in frames:
-        if clip.transforms is not None:
-            runtime.scene_buffers.set_pose(clip.transforms[frame], np.zeros((0, 4, 4)))
+        _set_pose(runtime, clip, frame)
         pictures.append(runtime.render(clip.views[frame], "irradiance"))
     return np.stack(pictures)
 
@@ -123,14 +125,8 @@ def swept_spot() -> Clip:
 def rising_bounds() -> Clip:
     """The courtyard's smallest part rises out of it, whose bounds double in height; the sun stands still."""
     scene, view = _shipped("courtyard")
-    low, high = scene.bounds()
-    smallest = _smallest_part(scene)
-    transforms = []
-    for share in _shares():
-        placed = np.array([instance.to_world for instance in scene.instances])
-        placed[smallest, 1, 3] += (high[1] - low[1]) * (0.5 + share)
-        transforms.append(placed)
-    return Clip("sun", tuple(VARIANTS), scene, (view,) * FRAMES, tuple(transforms))
+    moved = _smallest_part_moved(scene, lambda share: (0.0, 0.5 + share, 0.0))
+    return Clip("sun", tuple(VARIANTS), scene, (view,) * FRAMES, moved)
 
 
 def _shares() -> np.ndarray:
@@ -157,7 +153,8 @@ def _shipped(name: str) -> tuple[Scene, View]:
 def _runtime(clip: Clip, options: RuntimeOptions, factor: int) -> Runtime:
     changed = ArtistParameters().as_dict() | {"vpl_count": VPL_COUNT * factor}
     resolution = RSM_RESOLUTION * (2 if factor > 1 else 1)
-    return Runtime(clip.scene, TunedConfig(ArtistParameters(**changed)), options, rsm_resolution=resolution)
+    config = TunedConfig(ArtistParameters(**changed), visibility="maps")
+    return Runtime(clip.scene, config, options, rsm_resolution=resolution)
 
 
 def _changes(pictures: Float32[np.ndarray, "frames height width 3"]) -> Float32[np.ndarray, "steps"]:
@@ -182,22 +179,30 @@ def write_plot(path: Path, changes: dict[str, dict[str, np.ndarray]]) -> None:
 def carried_box() -> Clip:
     """The Cornell box's smallest part is carried from side to side under its lamp."""
     scene, view = _shipped("cornell-box")
-    low, high = scene.bounds()
-    smallest = _smallest_part(scene)
-    transforms = []
-    for share in _shares():
-        placed = np.array([instance.to_world for instance in scene.instances])
-        across = np.sin(2.0 * np.pi * share)
-        placed[smallest, :3, 3] += (high - low) * np.array([0.15 * across, 0.12, 0.0])
-        transforms.append(placed)
-    return Clip("box", ("both",), scene, (view,) * FRAMES, tuple(transforms))
+    moved = _smallest_part_moved(scene, lambda share: (0.15 * np.sin(2.0 * np.pi * share), 0.12, 0.0))
+    return Clip("box", ("both",), scene, (view,) * FRAMES, moved)
 
 
-def _smallest_part(scene: Scene) -> int:
-    return min(
+def _smallest_part_moved(
+    scene: Scene, offset: Callable[[float], tuple[float, float, float]]
+) -> tuple[np.ndarray, ...]:
+    """Transforms of all instances at each frame; `offset` is in sides of the scene's bounds."""
+    smallest = min(
         range(len(scene.instances)),
         key=lambda index: np.ptp(scene.meshes[scene.instances[index].mesh].positions, axis=0).max(),
     )
+    low, high = scene.bounds()
+    transforms = []
+    for share in _shares():
+        placed = np.array([instance.to_world for instance in scene.instances])
+        placed[smallest, :3, 3] += (high - low) * np.array(offset(share))
+        transforms.append(placed)
+    return tuple(transforms)
+
+
+def _set_pose(runtime: Runtime, clip: Clip, frame: int) -> None:
+    if clip.transforms is not None:
+        runtime.scene_buffers.set_pose(clip.transforms[frame], np.zeros((0, 4, 4)))
 
 
 def write_clip(path: Path, clip: Clip, config: TunedConfig, size: tuple[int, int] = (480, 360)) -> None:
@@ -206,8 +211,7 @@ def write_clip(path: Path, clip: Clip, config: TunedConfig, size: tuple[int, int
     exposure = None
     with clip_writer(path, size, 30.0) as write:
         for frame, view in enumerate(clip.views):
-            if clip.transforms is not None:
-                runtime.scene_buffers.set_pose(clip.transforms[frame], np.zeros((0, 4, 4)))
+            _set_pose(runtime, clip, frame)
             write(runtime.render(replace(view, size=size), exposure=exposure))
             exposure = runtime.exposure() if exposure is None else exposure
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import moderngl
 import numpy as np
 
-import configs
 from benchmarks.row import Row
+from benchmarks.scene_library import present_scenes
 from renderer.artist_parameters import ArtistParameters
 from renderer.capture import read_picture
 from renderer.comparison.vpls_readback import VplsReadback
@@ -19,7 +19,7 @@ from renderer.light_faces import LightRecords
 from renderer.runtime import Runtime
 from renderer.runtime_options import RuntimeOptions
 from renderer.scene_file import read_scene
-from renderer.tuned_config import TunedConfig
+from renderer.tuned_config import TunedConfig, Visibility
 from renderer.view_placement import resolve_camera_and_lights
 from renderer.views import View
 
@@ -29,6 +29,8 @@ VPL_COUNT = 1024
 READBACK_DRAWS = 128
 """VPLs drawn one by one; their time is stated for `VPL_COUNT`."""
 _PARAMETERS = ArtistParameters(vpl_count=VPL_COUNT, screen_space_strength=1.0)
+HARD_SCENES = ("sketchfab-macross-diorama", "playcanvas-chess-board", "bevy-mixedlightingexample")
+"""Where interleaving has it hardest: small parts and round bodies, whose windows lack subsets."""
 TARGET_MS = 1.0
 """The whole indirect path at 1080p with 1,024 VPLs on a data-centre GPU."""
 
@@ -40,24 +42,25 @@ def gather_rows(progress: Callable[[str, float], None]) -> list[Row]:
 
 
 def _rows(context: moderngl.Context, progress: Callable[[str, float], None]) -> list[Row]:
-    scene = _BenchmarkScene(context, "gallery")
+    paths = present_scenes()
+    scene = _BenchmarkScene(context, paths["gallery"])
     progress("full gather", 0.0)
-    drawn = scene.drawn(SIZE, RuntimeOptions())
-    full = _gather_milliseconds(context, drawn, repeats=2)
-    full_picture = read_picture(drawn.frame.vpl_irradiance)
-    progress("one draw for each VPL", 0.35)
+    drawn = scene.drawn(SIZE, RuntimeOptions(), "none")
+    full = _full_gather(context, drawn)
+    progress("one draw for each VPL", 0.25)
     read, placed, one_by_one = _readback_milliseconds(context, drawn)
-    progress("VPL placement", 0.5)
+    progress("VPL placement", 0.35)
     placement = _milliseconds(context, lambda: _place(drawn), repeats=5)
-    progress("interleaved gather", 0.55)
-    drawn = scene.drawn(SIZE, RuntimeOptions(interleave=4))
-    interleaved = _gather_milliseconds(context, drawn, repeats=3)
-    error = _relative_error(read_picture(drawn.frame.vpl_irradiance), full_picture)
-    progress("indirect path at 1080p", 0.65)
-    whole = _indirect_milliseconds(context, scene.drawn(SIZE_1080P, RuntimeOptions(interleave=4)))
-    return [
-        Row("gather_interleaved_4x4", interleaved, "ms", f"gather_full; relMSE {error:.2g}", full),
-        Row("gather_full", full, "ms", f"one additive draw per VPL, from {READBACK_DRAWS}", one_by_one),
+    progress("interleaved gather", 0.4)
+    rows = [
+        _interleaved_row(context, "gather_interleaved_4x4", scene, "none", full),
+        Row(
+            "gather_full",
+            full.milliseconds,
+            "ms",
+            f"one additive draw per VPL, from {READBACK_DRAWS}, without maps",
+            one_by_one,
+        ),
         Row(
             "vpls_gpu",
             placement,
@@ -65,22 +68,35 @@ def _rows(context: moderngl.Context, progress: Callable[[str, float], None]) -> 
             f"vpls_readback: RSM read back {read:.3g} ms, Poisson-disc VPLs made on the CPU",
             read + placed,
         ),
-        Row("frame_1080p_1024vpl", whole, "ms", "target on a data-centre GPU", TARGET_MS),
     ]
+    progress("indirect path at 1080p", 0.45)
+    drawn = scene.drawn(SIZE_1080P, RuntimeOptions(interleave=4), "none")
+    whole = _indirect_milliseconds(context, drawn)
+    rows.append(
+        Row("frame_1080p_1024vpl", whole, "ms", "target on a data-centre GPU, without maps", TARGET_MS)
+    )
+    others = [("gallery", "maps"), *((name, mode) for name in HARD_SCENES for mode in ("none", "maps"))]
+    others = [(name, mode) for name, mode in others if name in paths]
+    for index, (name, mode) in enumerate(others):
+        progress(f"interleaved gather, {name}", 0.6 + 0.4 * index / len(others))
+        scene = _BenchmarkScene(context, paths[name])
+        full = _full_gather(context, scene.drawn(SIZE, RuntimeOptions(), mode))
+        suffix = "_maps" if mode == "maps" else ""
+        rows.append(_interleaved_row(context, f"gather_interleaved_4x4_{name}{suffix}", scene, mode, full))
+    return rows
 
 
 class _BenchmarkScene:
-    """A scene of ours on the GPU, by its own camera and lights."""
+    """A scene on the GPU, by its own camera and lights, or those placed for it."""
 
-    def __init__(self, context: moderngl.Context, name: str):
-        path = Path(configs.__file__).parent / "scenes" / f"{name}.glb"
+    def __init__(self, context: moderngl.Context, path: Path):
         self._scene = read_scene(path)
         self._context = context
         self._camera, self._lights, _ = resolve_camera_and_lights(self._scene, path, None, None)
 
-    def drawn(self, size: tuple[int, int], options: RuntimeOptions) -> "_Drawn":
+    def drawn(self, size: tuple[int, int], options: RuntimeOptions, visibility: Visibility) -> "_Drawn":
         """A frame that has been drawn once, so that shaders are compiled and buffers filled."""
-        config = TunedConfig(_PARAMETERS, visibility="none")  # `vpltune bench visibility` has the maps
+        config = TunedConfig(_PARAMETERS, visibility=visibility)
         runtime = Runtime(self._scene, config, options, context=self._context)
         view = View("gather", "fitted", size, self._camera, self._lights)
         frame = runtime._draw(view)
@@ -120,6 +136,29 @@ def _gather_milliseconds(context: moderngl.Context, drawn: _Drawn, repeats: int)
     """Gather, and where it is interleaved, filter and the listed pixels' full gather."""
     camera = drawn.frame.camera(drawn.view)
     return _milliseconds(context, lambda: drawn.frame._gather(camera), repeats)
+
+
+@dataclass(frozen=True, eq=False)
+class _FullGather:
+    """What an interleaved gather is measured against."""
+
+    milliseconds: float
+    picture: np.ndarray
+
+
+def _full_gather(context: moderngl.Context, drawn: _Drawn) -> _FullGather:
+    milliseconds = _gather_milliseconds(context, drawn, repeats=2)
+    return _FullGather(milliseconds, read_picture(drawn.frame.vpl_irradiance))
+
+
+def _interleaved_row(
+    context: moderngl.Context, name: str, scene: _BenchmarkScene, visibility: Visibility, full: _FullGather
+) -> Row:
+    drawn = scene.drawn(SIZE, RuntimeOptions(interleave=4), visibility)
+    milliseconds = _gather_milliseconds(context, drawn, repeats=3)
+    error = _relative_error(read_picture(drawn.frame.vpl_irradiance), full.picture)
+    maps = "with visibility maps" if visibility == "maps" else "without maps"
+    return Row(name, milliseconds, "ms", f"gather_full, {maps}; relMSE {error:.2g}", full.milliseconds)
 
 
 def _place(drawn: _Drawn) -> None:

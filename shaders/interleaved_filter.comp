@@ -14,7 +14,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 uniform sampler2D interleaved;
 uniform sampler2D direction;  // with RELIGHT: of the light, octahedral
-uniform sampler2D base;  // with ADD_BASE: added to the result
+uniform sampler2D base;       // with ADD_BASE: added to the result
 
 layout(rgba32f, binding = 0) writeonly uniform image2D out_irradiance;
 
@@ -79,7 +79,7 @@ Window weigh(int center, vec2 ndc, vec2 ndc_step) {
 }
 
 // Whether the subsets that are absent from the window may change its mean too much. A mean of n of N things has
-// the variance σ²/n · (1 - n/N) (Cochran 1977, Eq. 2.20). σ² is told from neighbours on any surface: the subset
+// the variance σ²/n · (1 - n/N) (Cochran 1977, theorem 2.2). σ² is told from neighbours on any surface: the subset
 // with a VPL close by may be just the one that is absent.
 bool needs_full_gather(Window window) {
     float count = window.sum.a;

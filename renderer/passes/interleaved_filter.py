@@ -22,7 +22,8 @@ LEAST_ABSENT = 0.1
 LARGEST_ERROR = 0.09
 """Squared, relative to the mean's square: beyond, a pixel is gathered in full."""
 LARGEST_ERROR_IN_SHADOW = 0.05
-"""With visibility maps: a VPL that is seen from one pixel and not from the next is no stray of a sample."""
+"""With visibility maps: where a VPL is seen from one pixel and not from the next, a window errs by more than
+its subsets tell."""
 
 
 class InterleavedFilterPass:

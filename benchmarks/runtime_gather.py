@@ -46,7 +46,7 @@ def _rows(context: moderngl.Context, progress: Callable[[str, float], None]) -> 
     scene = _BenchmarkScene(context, paths["gallery"])
     progress("full gather", 0.0)
     drawn = scene.drawn(SIZE, RuntimeOptions(), "none")
-    full = _full_gather(context, drawn)
+    full = _full_gather(context, drawn, repeats=2)
     progress("one draw for each VPL", 0.25)
     read, placed, one_by_one = _readback_milliseconds(context, drawn)
     progress("VPL placement", 0.35)
@@ -80,7 +80,7 @@ def _rows(context: moderngl.Context, progress: Callable[[str, float], None]) -> 
     for index, (name, mode) in enumerate(others):
         progress(f"interleaved gather, {name}", 0.6 + 0.4 * index / len(others))
         scene = _BenchmarkScene(context, paths[name])
-        full = _full_gather(context, scene.drawn(SIZE, RuntimeOptions(), mode))
+        full = _full_gather(context, scene.drawn(SIZE, RuntimeOptions(), mode), repeats=1)
         suffix = "_maps" if mode == "maps" else ""
         rows.append(_interleaved_row(context, f"gather_interleaved_4x4_{name}{suffix}", scene, mode, full))
     return rows
@@ -146,8 +146,8 @@ class _FullGather:
     picture: np.ndarray
 
 
-def _full_gather(context: moderngl.Context, drawn: _Drawn) -> _FullGather:
-    milliseconds = _gather_milliseconds(context, drawn, repeats=2)
+def _full_gather(context: moderngl.Context, drawn: _Drawn, repeats: int) -> _FullGather:
+    milliseconds = _gather_milliseconds(context, drawn, repeats)
     return _FullGather(milliseconds, read_picture(drawn.frame.vpl_irradiance))
 
 

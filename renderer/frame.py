@@ -107,7 +107,7 @@ class Frame:
             self._interleaved_direction = create_direction_target(context, size)
             self._pixel_list = create_pixel_list(context, size)
             self._interleaved_filter = InterleavedFilterPass(
-                context, options.interleave, refine=True, relight=True, shadowed=map_size > 0
+                context, options.interleave, refine=True, relight=True, shadowed=hierarchy is not None
             )
         self._screen_space_indirect = ScreenSpaceIndirectPass(context, size, rsm_resolution, cells)
         self._screen_space_filter = InterleavedFilterPass(context, SCREEN_SPACE_BLOCK, add_base=True)

@@ -133,6 +133,12 @@ def seen_share(overlap: Float[Array, "*shape"], parameters: VisibilityParameters
     return 1.0 - jnp.clip((overlap - parameters.bias) / parameters.softness, 0.0, 1.0)
 
 
+def visibility_origin(vpls: VirtualPointLights) -> Float[Array, "vpls 3"]:
+    """Where the rays of each VPL's map start [L]. Twin in GLSL."""
+    lift = jnp.maximum(VISIBILITY_LIFT * vpls.footprint, VISIBILITY_LEAST_LIFT)
+    return vpls.position + lift[:, None] * vpls.normal
+
+
 @jax.jit
 def surface_overlap(
     receivers: Receivers, vpls: VirtualPointLights, texels: MapTexels
@@ -149,8 +155,7 @@ def surface_overlap(
     size, refinement = texels.block_start.shape[1], texels.refinement
     block_start = texels.block_start.reshape(-1)
     frame = hemisphere_frame(vpls.normal)
-    lift = jnp.maximum(VISIBILITY_LIFT * vpls.footprint, VISIBILITY_LEAST_LIFT)
-    origin = vpls.position + lift[:, None] * vpls.normal
+    origin = visibility_origin(vpls)
     first = jnp.arange(len(vpls.position)) * size * size
 
     def chunk(inputs: tuple[Array, Array]) -> Array:

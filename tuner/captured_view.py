@@ -31,6 +31,11 @@ class CapturedView:
     def __post_init__(self) -> None:
         object.__setattr__(self, "valid", self.captured.valid & self.reference.valid)
 
+    @property
+    def lit(self) -> bool:
+        """Whether any indirect light reaches it, by the reference; else no error has a measure."""
+        return bool(self.reference.irradiance[self.valid].any())
+
     def fitted_pixels(self, limit: int, seed: int) -> np.ndarray:
         """Indices into the captured frame's valid pixels, at most `limit`, drawn without replacement."""
         usable = np.flatnonzero(self.reference.valid.ravel()[self.captured.valid.ravel()])

@@ -1,5 +1,6 @@
 """Side by side: the reference, default, tuned and ceiling, under one exposure for each row."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -53,6 +54,8 @@ def picture_row(
 
 def captioned(name: str, metrics: ViewMetrics) -> str:
     """A panel's caption: whose picture it is, and how far from the reference."""
+    if math.isnan(metrics.relmse):
+        return f"{name}: no indirect light to compare with"
     return f"{name}: relMSE {metrics.relmse:.3g}, energy {metrics.energy_ratio:.2f}"
 
 

@@ -41,13 +41,13 @@ def error_budget(
     options: SceneOptions,
     progress: Callable[[float], None] | None = None,
 ) -> dict[str, float | str]:
-    """relMSE by cause, means over the fitted views, and `views`, which says so.
+    """relMSE by cause, means over the fitted views that light reaches, and `views`, which says so.
 
     Args:
         options: what `prepared` was made with.
         progress: called with the share done, in [0, 1].
     """
-    views = [view for view in evaluation.views if view.view.view.split == "fitted"]
+    views = [each for each in evaluation.views if each.view.view.split == "fitted" and each.view.lit]
     less: tuple[ReferenceView | None, ...] = (None,) * len(views)
     if options.bounces == "all":
         less = references_of(prepared.scene, tuple(view.view.view for view in views), options.seed, "1")
@@ -56,7 +56,8 @@ def error_budget(
         shares.append(_of_view(prepared.runtime, view, one_bounce))
         if progress is not None:
             progress((index + 1) / len(views))
-    return {"views": "fitted"} | {cause: fmean(share[cause] for share in shares) for cause in shares[0]}
+    causes = shares[0] if shares else {}
+    return {"views": "fitted"} | {cause: fmean(share[cause] for share in shares) for cause in causes}
 
 
 def _of_view(

@@ -66,6 +66,14 @@ class Evaluation:
             for evaluated in self.views
         ]
 
+    def notes(self) -> tuple[str, ...]:
+        """What the figures do not say of themselves, a sentence each."""
+        unlit = [each.view.view.name for each in self.views if not each.view.lit]
+        if not unlit:
+            return ()
+        names = ", ".join(unlit)
+        return (f"no indirect light reaches {names}: relMSE and energy ratio have no value there",)
+
     def _split(self, split: str) -> dict[str, Any]:
         views = [evaluated for evaluated in self.views if evaluated.view.view.split == split]
         if not views:

@@ -73,6 +73,6 @@ def evaluate_scene(scene_path: Path, options: EvaluateOptions, progress: Progres
         **budget,
         "ceiling_parameters": evaluation.ceiling_parameters.as_dict(),
         "per_view": evaluation.per_view(),
-        "notes": list(prepared.notes),
+        "notes": [*prepared.notes, *evaluation.notes()],
     }
     return SceneEvaluation(evaluation, document)

@@ -15,6 +15,7 @@ point shines for all that lies around it, not where shadows fall. With visibilit
 are fitted last, at the best density.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -135,7 +136,7 @@ def fit_density(
 
     for density in grid:
         measure(density)
-        if fits[density][1].status.failed:
+        if fits[density][1].status.nothing_fitted:
             # Nothing lit, or not finite: no density will mend it.
             return DensityFit(start, fits[density][1], _trials(fits))
     lowest = (*response_minimum([t for t in _trials(fits) if t.density_relaxation == RELAXATION]), RELAXATION)
@@ -211,5 +212,5 @@ def _relmse(view: CapturedView) -> float:
     r = (a.astype(np.float64) + b) / 2.0
     denominator = r**2 + DARK_SHARE * r.mean() ** 2 if r.size else r
     if not denominator.any():
-        return 0.0 if not y.any() else float("inf")
+        return math.nan
     return float(np.mean((y - a) * (y - b) / denominator))

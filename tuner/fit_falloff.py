@@ -114,7 +114,7 @@ def fit_to(
     tuned = replace(tuned, intensity=float(_best_intensity(FalloffParameters.of(tuned), data)))
     status = found.status
     if not found.loss < start_loss:
-        status = FitStatus.NOT_FINITE if status.failed else FitStatus.NO_IMPROVEMENT
+        status = FitStatus.NOT_FINITE if status.nothing_fitted else FitStatus.NO_IMPROVEMENT
         tuned = start
     elif status is FitStatus.NO_IMPROVEMENT:
         # The closed form alone has done it.

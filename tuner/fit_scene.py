@@ -126,6 +126,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
     )
     write_view_pictures(output / "pictures.npz", evaluation.views)
     write_config(output / "tuned.json", config)
+    notes = (*prepared.notes, *evaluation.notes())
     document = {
         "scene": str(scene_path),
         "parameters": tuned.as_dict(),
@@ -133,7 +134,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
         "views": str(output / "views.json"),
         "metrics": evaluation.summary(),
         "seconds": watch.report(),
-        "status": "failed" if descent.status.failed else "ok",
+        "status": descent.status.outcome,
         "sentence": descent.status.value,
         "loss": {
             "start": descent.start_loss,
@@ -145,7 +146,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
         **budget,
         "ceiling_parameters": evaluation.ceiling_parameters.as_dict(),
         "per_view": evaluation.per_view(),
-        "notes": list(prepared.notes),
+        "notes": list(notes),
         **found,
         "provenance": {
             **config.provenance,
@@ -156,7 +157,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
         },
     }
     write_text_whole(output / "metrics.json", strict_json(document) + "\n")
-    return FitResult(config, descent, evaluation, prepared.notes, document)
+    return FitResult(config, descent, evaluation, notes, document)
 
 
 def _fitted(
@@ -169,7 +170,8 @@ def _fitted(
     def report(share: float) -> None:
         progress("fit", share)
 
-    if options.budget is not None:
+    lit = any(view.lit for view in views)
+    if options.budget is not None and lit:
         tuned, descent, found = fit_to_budget(
             prepared,
             replace(options.start, parameters=start, auto=None),
@@ -178,12 +180,12 @@ def _fitted(
             seed=seed,
             progress=report,
         )
-    elif options.density:
+    elif options.density and lit:
         density = fit_density(prepared.runtime, views, start, seed=seed, progress=report)
         tuned, descent = density.parameters, density.descent
-        document = density_document(
-            prepared.runtime, views, default_like(options.start.parameters), density, seed
-        )
+        default = default_like(options.start.parameters)
+        measured = tuple(view for view in views if view.lit)
+        document = density_document(prepared.runtime, measured, default, density, seed)
         found = {"density": document}
     else:
         if options.start.visibility == "maps":
@@ -197,7 +199,7 @@ def _fitted(
     prepared.runtime.parameters = tuned
     references = tuple(view.reference for view in prepared.views)
     captured = capture_views(prepared.runtime, tuple(view.view for view in prepared.views), references)
-    if descent.status.failed:
+    if descent.status.nothing_fitted:
         return tuned, descent, {}, captured, found
     # Of one rotation: several of one view err together, and would pass for so many witnesses.
     ready = fit_views(_of_fitted(captured), tuned, seed=seed)

@@ -2,9 +2,13 @@
 
 import enum
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
+
+Outcome = Literal["ok", "unlit", "failed"]
+"""`unlit`: no indirect light reaches the views, which is no failure: there is nothing to fit."""
 
 
 class FitStatus(enum.Enum):
@@ -17,14 +21,20 @@ class FitStatus(enum.Enum):
     NOT_FINITE = "the loss at the start is not a finite number; the start is kept"
 
     @property
-    def failed(self) -> bool:
+    def outcome(self) -> Outcome:
+        """In a word, as metrics.json and records have it."""
+        words: dict[FitStatus, Outcome] = {FitStatus.NOTHING_LIT: "unlit", FitStatus.NOT_FINITE: "failed"}
+        return words.get(self, "ok")
+
+    @property
+    def nothing_fitted(self) -> bool:
         """Whether there was nothing that could be fitted."""
-        return self in (FitStatus.NOTHING_LIT, FitStatus.NOT_FINITE)
+        return self.outcome != "ok"
 
     @property
     def start_kept(self) -> bool:
         """Whether the result is the start itself."""
-        return self.failed or self is FitStatus.NO_IMPROVEMENT
+        return self.nothing_fitted or self is FitStatus.NO_IMPROVEMENT
 
 
 @dataclass(frozen=True, eq=False)

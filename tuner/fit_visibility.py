@@ -90,7 +90,7 @@ def fit_visibility(
             for view in chosen
         )
         current, falloff = fit_to(ready, current)
-        if falloff.status.failed:
+        if falloff.status.nothing_fitted:
             return start, None
         current, descent = fit_visibility_to(tuple(_reduced(view, current) for view in chosen), current)
     found = {spec.name: getattr(current, spec.name) for spec in VISIBILITY_SPECS}

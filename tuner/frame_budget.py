@@ -91,7 +91,7 @@ class BudgetFit:
 
 
 class FrameBudget:
-    """Fits a prepared scene to budgets, of frames of one size.
+    """Fits a prepared scene, some view of which is lit, to budgets of frames of one size.
 
     The slowest of the fitted views counts. Raises MachineError as `Runtime`.
     """
@@ -107,8 +107,10 @@ class FrameBudget:
     ):
         self._prepared = prepared
         self._seed = seed
-        self._views = tuple(view for view in prepared.views if view.view.split == "fitted")
-        self._timed = tuple(replace(view.view, size=frame_size) for view in self._views)
+        fitted = [view for view in prepared.views if view.view.split == "fitted"]
+        # A view that no light reaches says nothing of errors, and takes its time all the same.
+        self._views = tuple(view for view in fitted if view.lit)
+        self._timed = tuple(replace(view.view, size=frame_size) for view in fitted)
         guessed = replace(
             start.parameters, density_importance=GUESSED_IMPORTANCE, density_relaxation=RELAXATION
         )

@@ -72,7 +72,7 @@ def fit_with_intervals(
     """
     names = frozenset(SearchSpace().names) - held
     tuned, descent = fit_to(views, prior, held=held, progress=progress)
-    if descent.status.failed:
+    if descent.status.nothing_fitted:
         return tuned, descent, {}
     found: dict[str, Interval] = {}
     offset = float(np.mean([view.reduced.offset for view in views]))

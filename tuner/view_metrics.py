@@ -1,6 +1,11 @@
-"""How far a picture is from its reference: relMSE and energy of irradiance, HDR-FLIP of radiance."""
+"""How far a picture is from its reference: relMSE and energy of irradiance, HDR-FLIP of radiance.
 
+relMSE and energy ratio are relative to the reference's mean: against a black one they are NaN, null in JSON.
+"""
+
+import math
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from statistics import fmean
 
@@ -28,20 +33,18 @@ class ViewMetrics:
 
 
 def relmse(picture: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:
-    """Relative mean squared error; 0 against a black reference if the picture is black, else infinite."""
+    """Relative mean squared error; NaN against a black reference."""
     y, r = picture.astype(np.float64), reference.astype(np.float64)
     denominator = r**2 + DARK_SHARE * r.mean() ** 2 if r.size else r
     if not denominator.any():
-        return 0.0 if not y.any() else float("inf")
+        return math.nan
     return float(np.mean((y - r) ** 2 / denominator))
 
 
 def energy_ratio(picture: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:
-    """Mean of the picture over mean of the reference; 1 where both are black."""
-    y, r = float(picture.mean(dtype=np.float64)), float(reference.mean(dtype=np.float64))
-    if r > 0.0:
-        return y / r
-    return 1.0 if y == 0.0 else float("inf")
+    """Mean of the picture over mean of the reference; NaN against a black reference."""
+    mean = float(reference.mean(dtype=np.float64)) if reference.size else 0.0
+    return float(picture.mean(dtype=np.float64)) / mean if mean > 0.0 else math.nan
 
 
 def hdr_flip(
@@ -85,9 +88,14 @@ def view_metrics(
 
 
 def mean_metrics(metrics: list[ViewMetrics]) -> ViewMetrics:
-    """The mean of each figure over views."""
+    """The mean of each figure over the views that have it; NaN where none does."""
     return ViewMetrics(
-        relmse=fmean(m.relmse for m in metrics),
-        energy_ratio=fmean(m.energy_ratio for m in metrics),
-        flip=fmean(m.flip for m in metrics),
+        relmse=_mean(m.relmse for m in metrics),
+        energy_ratio=_mean(m.energy_ratio for m in metrics),
+        flip=_mean(m.flip for m in metrics),
     )
+
+
+def _mean(values: Iterable[float]) -> float:
+    known = [value for value in values if not math.isnan(value)]
+    return fmean(known) if known else math.nan

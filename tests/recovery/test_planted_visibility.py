@@ -42,7 +42,7 @@ def test_recovery(gl_context):
     )
     found, descent = fit_visibility(views, start)
     assert descent is not None
-    assert not descent.status.failed
+    assert not descent.status.nothing_fitted
     assert found.visibility_bias == pytest.approx(PLANTED.visibility_bias, rel=0.05)
     assert found.visibility_softness == pytest.approx(PLANTED.visibility_softness, rel=0.05)
     # What else a fit needs on the way is not its to give back.

@@ -5,7 +5,7 @@ import re
 import shlex
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
@@ -217,28 +217,29 @@ def _report(result: "BatchResult", output: Path) -> Report:
     from rich.markup import escape
     from rich.table import Table
 
-    from tuner.library.record import as_document
+    from tuner.library.record import Status, as_document
 
-    counts = {status: result.count(status) for status in ("done", "failed", "refused")}
+    counts = {status: result.count(status) for status in get_args(Status)}
+    partly = counts["failed"] + counts["refused"] > 0
     document = {
-        "status": "ok" if counts["done"] == len(result.records) else "partly done",
+        "status": "partly done" if partly else "ok",
         **counts,
         "fitted": result.fitted,
         "copies": result.copies,
         "output": str(output),
         "records": [as_document(record) for record in result.records],
     }
-    troubled = [record for record in result.records if record.status != "done"]
+    untuned = [record for record in result.records if record.status != "done"]
     table = Table(title="Not tuned", title_justify="left")
     for heading in ("scene", "", "why"):
         table.add_column(heading, overflow="fold")
-    for record in troubled:
+    for record in untuned:
         table.add_row(escape(record.name), record.status, escape(record.reason))
     sentence = ", ".join(f"{count} {status}" for status, count in counts.items() if count)
     shown = (
-        *((table,) if troubled else ()),
+        *((table,) if untuned else ()),
         f"{sentence}; {result.fitted} of them in this run",
         f"records: {escape(str(output / 'records'))}",
         f"report:  {escape(shlex.join(('vpltune', 'report', str(output))))}",
     )
-    return Report(document, shown, PARTLY_DONE if troubled else OK)
+    return Report(document, shown, PARTLY_DONE if partly else OK)

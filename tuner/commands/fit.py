@@ -112,4 +112,4 @@ def _report(document: dict, output: Path) -> Report:
         f"next:    {escape(shlex.join(command))}",
         f"report:  {escape(shlex.join(('vpltune', 'report', str(output))))}",
     )
-    return Report(document, shown, OK if document["status"] == "ok" else PARTLY_DONE)
+    return Report(document, shown, PARTLY_DONE if document["status"] == "failed" else OK)

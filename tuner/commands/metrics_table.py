@@ -1,5 +1,6 @@
 """The table that `fit` and `evaluate` end with."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -88,5 +89,5 @@ def error_budget_table(document: Mapping[str, Any]) -> tuple[Any, ...]:
     return (table,)
 
 
-def _number(value: Any) -> str:
-    return "–" if value is None else f"{value:.3g}"
+def _number(value: float | None) -> str:
+    return "–" if value is None or math.isnan(value) else f"{value:.3g}"

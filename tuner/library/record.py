@@ -10,7 +10,7 @@ from typing import Any, Literal
 from renderer.atomic_file import write_text_whole
 from renderer.strict_json import strict_json
 
-Status = Literal["done", "failed", "refused"]
+Status = Literal["done", "unlit", "failed", "refused"]
 
 SUFFIX = ".json"
 
@@ -26,7 +26,8 @@ class Record:
     name: str
     """The scene file as the library names it: relative to its folder."""
     status: Status
-    """`refused`: the file cannot be used, whatever is tried. `failed`: every attempt failed."""
+    """`unlit`: no indirect light reaches its views, so the start is kept. `refused`: the file cannot be used,
+    whatever is tried. `failed`: every attempt failed."""
     reason: str
     """How the fit ended, or why there is none; one line."""
     seconds: float

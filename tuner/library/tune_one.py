@@ -68,7 +68,7 @@ def _fitted(job: Job, attempt: int, progress: Progress) -> Record:
             raise  # the output cannot be written, which is no fault of the scene's
         return _record(job, "refused", str(error), time.perf_counter() - started, attempt, "")
     document = result.document
-    status: Status = "done" if document["status"] == "ok" else "failed"
+    status: Status = "done" if document["status"] == "ok" else document["status"]
     return _record(
         job,
         status,

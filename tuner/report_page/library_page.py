@@ -97,7 +97,7 @@ def _cards(batch: BatchFolder, rows: list[TunedRow], untuned: list[UntunedRow]) 
     total = len(rows) + len(untuned)
     counts = {
         status: sum(row.status == status for row in untuned)
-        for status in ("refused", "failed", "unreadable", "waiting")
+        for status in ("unlit", "refused", "failed", "unreadable", "waiting")
     }
     middle = {variant: _median([row.relmse[variant] for row in rows]) for variant in VARIANTS}
     fell = change(middle["default"], middle["tuned"])

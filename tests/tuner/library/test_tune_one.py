@@ -80,11 +80,12 @@ def test_an_attempt_that_fails_leaves_no_record_and_no_claim(make_job, fits, err
     assert not job.claim.exists()
 
 
-def test_a_fit_with_nothing_to_fit_has_failed_but_keeps_its_output(make_job, fits):
+@pytest.mark.parametrize("status", ["unlit", "failed"])
+def test_a_fit_with_nothing_to_fit_keeps_its_output(make_job, fits, status):
     job = make_job()
-    fits.status = "failed"
+    fits.status = status
     record = tune_one(job)
-    assert (record.status, record.output) == ("failed", job.output_name)
+    assert (record.status, record.output) == (status, job.output_name)
 
 
 def test_set_aside_keeps_the_reason_and_yields_to_a_record(make_job, fits):

@@ -65,7 +65,7 @@ def made_batch(folder, fitted_folder):
         record_of("elsewhere.glb", output="../../etc"),
         record_of("odd.obj", "refused", "odd.obj: line 3: not a number <b>"),
         record_of("slow.glb", "failed", "ran for 600 s, the limit"),
-        record_of("unlit.glb", "failed", "no indirect light reaches the fitted views", output="scenes/unlit"),
+        record_of("unlit.glb", "unlit", "no indirect light reaches the fitted views", output="scenes/unlit"),
         record_of(HOSTILE, "refused", HOSTILE),
     ):
         records.write(record)
@@ -102,7 +102,7 @@ def test_it_opens_worst_first_with_totals_and_reasons(chromium, library, capfd):
         assert shown.page.locator("#tuned tbody img").count() == 9
         cards = shown.page.inner_text(".cards")
         assert "3 of 10" in cards
-        assert "2 refused, 2 failed, 2 unreadable, 1 waiting" in cards
+        assert "1 unlit, 2 refused, 1 failed, 2 unreadable, 1 waiting" in cards
         assert "2 of 3" in cards
         untuned = shown.page.inner_text("#untuned")
         assert "odd.obj: line 3: not a number <b>" in untuned

@@ -96,6 +96,9 @@ class Light:
 
     A spot's intensity falls from `inner_cone` to `outer_cone` (half angles, radians) as
     KHR_lights_punctual says: clamp((cos θ − cos outer)/(cos inner − cos outer), 0, 1)².
+
+    Raises:
+        ValueError: the direction of a light that has one is not of unit length.
     """
 
     kind: LightKind
@@ -108,6 +111,15 @@ class Light:
     inner_cone: float = 0.0
     outer_cone: float = float(np.pi / 4)
     name: str = ""
+
+    def __post_init__(self) -> None:
+        length = float(np.linalg.norm(self.direction_world))
+        # 1e-4: as far as single precision and numbers written with five digits are off.
+        if self.kind != "point" and not abs(length - 1.0) <= 1e-4:
+            raise ValueError(
+                f"Light.direction_world: must be a unit vector, got {self.direction_world.tolist()} "
+                f"of length {length:.6g}"
+            )
 
 
 @dataclass(frozen=True, eq=False)

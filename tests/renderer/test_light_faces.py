@@ -97,3 +97,10 @@ def test_faces_are_counted_without_a_scene():
     lights = tuple(ROOM_LIGHTS.values())
     bounds = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
     assert face_count(lights) == len(light_records(lights, bounds).faces) == 1 + 5 + 6 + 1
+
+
+@pytest.mark.parametrize("direction", [[0.0, -2.0, 0.0], [0.0, 0.0, 0.0], [np.nan, 0.0, 1.0]])
+@pytest.mark.parametrize("kind", ["spot", "directional"])
+def test_a_direction_that_is_no_unit_vector_is_refused(kind, direction):
+    with pytest.raises(ValueError, match=r"Light\.direction_world: must be a unit vector, got \["):
+        Light(kind, np.ones(3), direction_world=np.array(direction))

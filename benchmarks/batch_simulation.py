@@ -102,13 +102,13 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 class DrawnLibrary:
     """Scenes drawn at random, as arrays."""
 
-    bytes: Float64[np.ndarray, "scenes"]
-    plain_seconds: Float64[np.ndarray, "scenes"]
+    bytes: Float64[np.ndarray, " scenes"]
+    plain_seconds: Float64[np.ndarray, " scenes"]
     """Of every attempt at scenes that do not hang."""
-    hanging: Float64[np.ndarray, "scenes"]
+    hanging: Float64[np.ndarray, " scenes"]
     """1 where a scene hangs, else 0."""
 
-    def seconds(self, hang_seconds: float = MOST_PASSED * SCENE_SECONDS) -> Float64[np.ndarray, "scenes"]:
+    def seconds(self, hang_seconds: float = MOST_PASSED * SCENE_SECONDS) -> Float64[np.ndarray, " scenes"]:
         """What a worker spends on each scene."""
         return np.where(self.hanging > 0.0, hang_seconds, self.plain_seconds)
 
@@ -154,7 +154,7 @@ def batch_hours(
     return (before + end + count * head.per_read_record) / 3600.0
 
 
-def _queue_seconds(seconds: Float64[np.ndarray, "scenes"], workers: int, per_ended_scene: float) -> float:
+def _queue_seconds(seconds: Float64[np.ndarray, " scenes"], workers: int, per_ended_scene: float) -> float:
     """When the last scene is taken in: whoever is free has the next of the queue."""
     waiting = iter(seconds.tolist())
     running = [STARTUP_S + cost for _, cost in zip(range(workers), waiting, strict=False)]

@@ -63,7 +63,7 @@ def auto_runtime(clip: CarriedLight, prior: AutoPrior | None = None, **keywords:
     return Runtime(clip.scene, config, options, **keywords)
 
 
-def drawn_places(runtime: Runtime) -> Float64[np.ndarray, "parameters"]:
+def drawn_places(runtime: Runtime) -> Float64[np.ndarray, " parameters"]:
     """Where in the unit cube the last picture's parameters lie."""
     values = runtime.drawn_parameters().as_dict()
     return np.array([place_of(parameter_spec(name), values[name]) for name in AUTO_PARAMETERS])
@@ -90,7 +90,7 @@ def write_carried_light(folder: Path) -> None:
     write_png(folder / "carried_light.png", np.concatenate(shown, axis=1))
 
 
-def _curves(values: np.ndarray) -> tuple[UInt8[np.ndarray, "height width 3"], Int64[np.ndarray, "frames"]]:
+def _curves(values: np.ndarray) -> tuple[UInt8[np.ndarray, "height width 3"], Int64[np.ndarray, " frames"]]:
     """All parameters over all frames, and the column of the plot at which each frame lies."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

@@ -83,7 +83,7 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 
 def measured_changes(
     clip: Clip, progress: Callable[[str, float], None]
-) -> dict[str, Float32[np.ndarray, "steps"]]:
+) -> dict[str, Float32[np.ndarray, " steps"]]:
     """For each variant and the reference, the mean absolute change of each step, of the mean irradiance."""
     changes = {}
     for index, name in enumerate(clip.variants):
@@ -157,7 +157,7 @@ def _runtime(clip: Clip, options: RuntimeOptions, factor: int) -> Runtime:
     return Runtime(clip.scene, config, options, rsm_resolution=resolution)
 
 
-def _changes(pictures: Float32[np.ndarray, "frames height width 3"]) -> Float32[np.ndarray, "steps"]:
+def _changes(pictures: Float32[np.ndarray, "frames height width 3"]) -> Float32[np.ndarray, " steps"]:
     return np.abs(np.diff(pictures, axis=0)).mean(axis=(1, 2, 3)) / pictures.mean()
 
 

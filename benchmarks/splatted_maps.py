@@ -163,7 +163,7 @@ def _splatted(offset: Float64[np.ndarray, "points 3"], width: float) -> Int64[np
 
 
 def _filled(
-    nearest: Int64[np.ndarray, "size size"], distance: Float64[np.ndarray, "points"]
+    nearest: Int64[np.ndarray, "size size"], distance: Float64[np.ndarray, " points"]
 ) -> Int64[np.ndarray, "size size"]:
     """Pull-push: a hole takes the nearest point of the smallest square around it that has any."""
     if len(nearest) == 1:
@@ -178,7 +178,7 @@ def _filled(
 def _nearer(
     a: Int64[np.ndarray, "rows columns"],
     b: Int64[np.ndarray, "rows columns"],
-    distance: Float64[np.ndarray, "points"],
+    distance: Float64[np.ndarray, " points"],
 ) -> Int64[np.ndarray, "rows columns"]:
     distances = np.concatenate([distance, [np.inf]])
     return np.where(distances[b] < distances[a], b, a)

@@ -115,8 +115,8 @@ class _Track:
 
     animated: str
     interpolation: str
-    nodes: Int64[np.ndarray, "channels"]
-    durations: Float64[np.ndarray, "channels"]
+    nodes: Int64[np.ndarray, " channels"]
+    durations: Float64[np.ndarray, " channels"]
     times: Float64[np.ndarray, "channels keys"]
     values: Float64[np.ndarray, "channels keys components"]
     tangents: Float64[np.ndarray, "channels keys 2 components"] | None
@@ -204,7 +204,7 @@ def _tracks(channels: tuple[Channel, ...]) -> list[_Track]:
     ]
 
 
-def _levels(animation: Animation) -> list[Int64[np.ndarray, "rows"]]:
+def _levels(animation: Animation) -> list[Int64[np.ndarray, " rows"]]:
     """Rows of nodes by depth: each level's parents are in the level above."""
     depth = np.zeros(len(animation.parents), np.int64)
     for row, parent in enumerate(animation.parents):

@@ -42,13 +42,13 @@ class AutoPrior:
     highest: Vector
     """The part of the unit cube that it was trained in, and never leaves."""
 
-    def point(self, statistics: Float64[np.ndarray, "statistics"]) -> Float64[np.ndarray, "parameters"]:
+    def point(self, statistics: Float64[np.ndarray, " statistics"]) -> Float64[np.ndarray, "parameters"]:
         """Where in the unit cube, of the axes `AUTO_PARAMETERS`."""
         free = np.array(self.weights) @ statistics + np.array(self.bias)
         return np.clip(free, self.lowest, self.highest)
 
     def parameters(
-        self, statistics: Float64[np.ndarray, "statistics"], rest: ArtistParameters
+        self, statistics: Float64[np.ndarray, " statistics"], rest: ArtistParameters
     ) -> ArtistParameters:
         """The parameters for a scene with these statistics; those that a prior does not set, from `rest`."""
         values = {

@@ -36,7 +36,7 @@ class BoundingVolumes:
     """[pairs, 2] of `NODE_DTYPE`; none where all items fit in one leaf."""
     root: int
     """As `child` of a node."""
-    order: Int64[np.ndarray, "items"]
+    order: Int64[np.ndarray, " items"]
     """Which item stands at each place of the leaves."""
     low: Float32[np.ndarray, "3"]
     high: Float32[np.ndarray, "3"]

@@ -44,7 +44,7 @@ class CapturedFrame:
     """With the screen-space near field, where its strength is not 0."""
     vpl_position_world: Float32[np.ndarray, "vpls 3"]
     vpl_normal_world: Float32[np.ndarray, "vpls 3"]
-    vpl_footprint: Float32[np.ndarray, "vpls"]
+    vpl_footprint: Float32[np.ndarray, " vpls"]
     """Radius of the disc that the VPL stands for."""
     vpl_flux: Float32[np.ndarray, "vpls 3"]
     """Reflected radiant flux [W]."""

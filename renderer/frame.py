@@ -163,7 +163,7 @@ class Frame:
         """The exposure of the display picture: waits for the GPU."""
         return self._tone_mapping.read_exposure()
 
-    def read_statistics(self, view: View) -> Float32[np.ndarray, "statistics"]:
+    def read_statistics(self, view: View) -> Float32[np.ndarray, " statistics"]:
         """The statistics of `view`, which has just been drawn: waits for the GPU."""
         if self._scene_statistics is None:
             self._scene_statistics = SceneStatisticsPass(self._context, self._visibility)

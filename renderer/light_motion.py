@@ -95,7 +95,7 @@ class BouncingLights:
         self,
         velocity: Float64[np.ndarray, "m 3"],
         mean_velocity: Float64[np.ndarray, "m 3"],
-        voxel: Int64[np.ndarray, "m"],
+        voxel: Int64[np.ndarray, " m"],
     ) -> Float64[np.ndarray, "m 3"]:
         """Velocities mirrored about the surface in the voxels that lights are about to enter."""
         backwards = -mean_velocity / np.linalg.norm(mean_velocity, axis=1, keepdims=True)
@@ -109,7 +109,7 @@ class BouncingLights:
         # Slower than one tick's fall, a light would be drawn back before it has left.
         return velocity + (np.maximum(abs(along), self._fall) - along) * normal
 
-    def _voxels(self, positions: Float64[np.ndarray, "n 3"]) -> Int64[np.ndarray, "n"]:
+    def _voxels(self, positions: Float64[np.ndarray, "n 3"]) -> Int64[np.ndarray, " n"]:
         _, rows, columns = self._space.shape
         cell = positions.astype(np.int64)
         return (cell[:, 0] * rows + cell[:, 1]) * columns + cell[:, 2]

@@ -15,7 +15,7 @@ class PlacedBoxes:
     """Boxes in the space of an instance or a joint, and which of their matrices places each."""
 
     corners: Float64[np.ndarray, "boxes 8 3"]
-    matrices: Int64[np.ndarray, "boxes"]
+    matrices: Int64[np.ndarray, " boxes"]
     """Row among the transforms of all instances, followed by all joint matrices."""
 
     def bounds(

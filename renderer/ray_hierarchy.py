@@ -132,7 +132,7 @@ class RayHierarchy:
                 corners[name][:, :3] = joined[:, corner]
         return roots, np.concatenate(nodes), corners
 
-    def _top_nodes(self, to_world: np.ndarray, seen: Int64[np.ndarray, "seen"]) -> np.ndarray:
+    def _top_nodes(self, to_world: np.ndarray, seen: Int64[np.ndarray, " seen"]) -> np.ndarray:
         """The tree over instances: its root is always the pair at 0."""
         nodes = np.zeros((self._first_mesh_node // 2, 2), NODE_DTYPE)
         # Boxes that no ray reaches.

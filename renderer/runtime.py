@@ -209,7 +209,7 @@ class Runtime:
         return self._last_frame("drawn_parameters").parameters.read()
 
     @_on_own_context
-    def scene_statistics(self, view: View) -> Float32[np.ndarray, "statistics"]:
+    def scene_statistics(self, view: View) -> Float32[np.ndarray, " statistics"]:
         """What `renderer.scene_statistics` names, of the view that was drawn last: waits for the GPU.
 
         Raises:

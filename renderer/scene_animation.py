@@ -21,7 +21,7 @@ class Channel:
     """Row of `Animation.parents`."""
     animated: AnimatedProperty
     interpolation: Interpolation
-    times: Float64[np.ndarray, "keys"]
+    times: Float64[np.ndarray, " keys"]
     """Seconds, rising strictly."""
     values: Float64[np.ndarray, "keys components"]
     tangents: Float64[np.ndarray, "keys 2 components"] | None
@@ -34,7 +34,7 @@ class Channel:
 class Skin:
     """Joints that vertices follow."""
 
-    joints: Int32[np.ndarray, "joints"]
+    joints: Int32[np.ndarray, " joints"]
     """Rows of `Animation.parents`."""
     inverse_bind: Float64[np.ndarray, "joints 4 4"]
     """From the mesh's own space to each joint's, as they stood when the two were joined."""
@@ -67,21 +67,21 @@ class Animation:
     each from its channel or at rest.
     """
 
-    parents: Int32[np.ndarray, "nodes"]
+    parents: Int32[np.ndarray, " nodes"]
     """A parent's row is before its children's."""
     rest_local: Float64[np.ndarray, "nodes 4 4"]
     rest_translation: Float64[np.ndarray, "nodes 3"]
     rest_rotation: Float64[np.ndarray, "nodes 4"]
     rest_scale: Float64[np.ndarray, "nodes 3"]
     channels: tuple[Channel, ...]
-    instance_nodes: Int32[np.ndarray, "instances"]
+    instance_nodes: Int32[np.ndarray, " instances"]
     """The node of each of `Scene.instances`; −1 where a skin places it."""
     instance_local: Float64[np.ndarray, "instances 4 4"]
     """From the instance to its node (EXT_mesh_gpu_instancing); else the identity."""
-    instance_skins: Int32[np.ndarray, "instances"]
+    instance_skins: Int32[np.ndarray, " instances"]
     """Index into `skins` where the vertices follow joints."""
-    light_nodes: Int32[np.ndarray, "lights"]
-    camera_nodes: Int32[np.ndarray, "cameras"]
+    light_nodes: Int32[np.ndarray, " lights"]
+    camera_nodes: Int32[np.ndarray, " cameras"]
     skins: tuple[Skin, ...]
     root_to_world: Float64[np.ndarray, "4 4"]
 

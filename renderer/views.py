@@ -171,7 +171,7 @@ def _member(entry: Any, key: str, where: str) -> Any:
     return entry[key]
 
 
-def _numbers(entry: Any, key: str, count: int, where: str) -> Float64[np.ndarray, "count"]:
+def _numbers(entry: Any, key: str, count: int, where: str) -> Float64[np.ndarray, " count"]:
     value = _member(entry, key, where)
     items = value if isinstance(value, list) else [value]
     # bool is an int to Python; JSON's 1e999 arrives as infinity and NaN as itself.

@@ -41,8 +41,8 @@ class BinnedGather:
     """Φ cosθ_x cosθ_j / (π d²) with interpolation weights, summed over VPLs [W/m²].
 
     Nodes are ordered by distance, then footprint."""
-    distance: Float[Array, "distances"]
-    footprint: Float[Array, "footprints"]
+    distance: Float[Array, " distances"]
+    footprint: Float[Array, " footprints"]
 
 
 def bin_vpls(
@@ -89,8 +89,10 @@ def gather_binned(binned: BinnedGather, parameters: FalloffParameters) -> Float[
 
 
 def node_falloff(
-    distance: Float[Array, "distances"], footprint: Float[Array, "footprints"], parameters: FalloffParameters
-) -> Float[Array, "nodes"]:
+    distance: Float[Array, " distances"],
+    footprint: Float[Array, " footprints"],
+    parameters: FalloffParameters,
+) -> Float[Array, " nodes"]:
     """f(d, l) at the nodes of a grid, in the order of `BinnedGather.irradiance`."""
     softening = parameters.falloff_footprint * footprint[None, :] / distance[:, None]
     transmittance = jnp.exp(-parameters.falloff_transmittance * distance)[:, None]

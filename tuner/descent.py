@@ -32,7 +32,7 @@ _LEAST_DAMPING, _MOST_DAMPING = 1e-7, 1e7
 _NARROWING, _WIDENING = 0.1, 10.0
 
 Data = TypeVar("Data")
-Residuals = Callable[[Float[Array, "parameters"], Data], Float[Array, "..."]]
+Residuals = Callable[[Float[Array, " parameters"], Data], Float[Array, "..."]]
 
 
 class _Linearised(NamedTuple):
@@ -52,7 +52,7 @@ class _State(NamedTuple):
 def descend(
     residuals: Residuals,
     data: Data,
-    start: Float[np.ndarray, "parameters"],
+    start: Float[np.ndarray, " parameters"],
     *,
     offset: float = 0.0,
     steps: int = STEPS,
@@ -91,11 +91,11 @@ def descend(
 def profile(
     residuals: Residuals,
     data: Data,
-    start: Float[np.ndarray, "parameters"],
+    start: Float[np.ndarray, " parameters"],
     axis: int,
-    places: Float[np.ndarray, "places"],
-    free: Bool[np.ndarray, "parameters"],
-) -> Float[np.ndarray, "places"]:
+    places: Float[np.ndarray, " places"],
+    free: Bool[np.ndarray, " parameters"],
+) -> Float[np.ndarray, " places"]:
     """The least Σ residuals² with one parameter held at each of `places`, and those that are `free` at their
     best; the rest stays at `start`."""
     free = free & (np.arange(len(start)) != axis)

@@ -151,7 +151,7 @@ def _squares(falloff: FalloffParameters, data: Data) -> Float[Array, ""]:
 def all_residuals(space: SearchSpace) -> Residuals:
     """Residuals over all of `space`, k like the others; what they are given is the reduced views."""
 
-    def residuals(point: Float[Array, "parameters"], data: Data) -> Float[Array, "rows"]:
+    def residuals(point: Float[Array, " parameters"], data: Data) -> Float[Array, " rows"]:
         pictures, targets = _pictures_and_targets(FalloffParameters(**space.values(point)), data)
         return (pictures - targets) / np.sqrt(len(data))
 
@@ -162,8 +162,8 @@ def all_residuals(space: SearchSpace) -> Residuals:
 def _residuals(space: SearchSpace) -> Residuals:
     # One function object for each space: the compiled fit is found again by it.
     def residuals(
-        point: Float[Array, "parameters"], given: tuple[Data, FalloffParameters]
-    ) -> Float[Array, "rows"]:
+        point: Float[Array, " parameters"], given: tuple[Data, FalloffParameters]
+    ) -> Float[Array, " rows"]:
         data, rest = given
         falloff = replace(rest, intensity=jnp.ones(()), **space.values(point))
         pictures, targets = _pictures_and_targets(falloff, data)

@@ -41,10 +41,10 @@ class FitStatus(enum.Enum):
 class Descent:
     """The best point met, which is never worse than the start."""
 
-    point: Float[np.ndarray, "parameters"]
+    point: Float[np.ndarray, " parameters"]
     """In the unit cube."""
     loss: float
     start_loss: float
-    losses: Float[np.ndarray, "steps"]
+    losses: Float[np.ndarray, " steps"]
     """The loss at every step, the start first."""
     status: FitStatus

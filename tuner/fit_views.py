@@ -29,7 +29,7 @@ class FitView:
     binned: BinnedGather
     target: Target
     reduced: ReducedGather
-    tile: Int[Array, "receivers"]
+    tile: Int[Array, " receivers"]
     """Which of the view's TILES² tiles a receiver lies in."""
 
 
@@ -39,7 +39,7 @@ def fit_view(
     visibility: Visibility | None,
     half_a: Float32[np.ndarray, "receivers 3"],
     half_b: Float32[np.ndarray, "receivers 3"],
-    pixels: Int[np.ndarray, "receivers"],
+    pixels: Int[np.ndarray, " receivers"],
     size: tuple[int, int],
     even_share: float = EVEN_SHARE,
 ) -> FitView:

@@ -48,7 +48,7 @@ class ReducedVisibility:
     """One view with its falloff held. |factor · (1, seen at the nodes) − target|² + offset is its loss."""
 
     factor: Float[Array, "rows columns"]
-    target: Float[Array, "rows"]
+    target: Float[Array, " rows"]
     offset: Float[Array, ""]
 
 
@@ -117,13 +117,13 @@ def fit_visibility_to(
 @jax.jit
 def _squares(
     points: Float[Array, "points parameters"], views: tuple[ReducedVisibility, ...]
-) -> Float[Array, "points"]:
+) -> Float[Array, " points"]:
     return jax.lax.map(lambda point: jnp.sum(residuals(point, views) ** 2), points)
 
 
 def residuals(
-    point: Float[Array, "parameters"], views: tuple[ReducedVisibility, ...]
-) -> Float[Array, "rows"]:
+    point: Float[Array, " parameters"], views: tuple[ReducedVisibility, ...]
+) -> Float[Array, " rows"]:
     """Of all views, each counting the same, at a point of the unit cube."""
     values = SPACE.values(point)
     parameters = VisibilityParameters(values["visibility_bias"], values["visibility_softness"])
@@ -132,7 +132,7 @@ def residuals(
     return jnp.concatenate(pictures) / np.sqrt(len(views))
 
 
-def overlap_nodes() -> Float[np.ndarray, "nodes"]:
+def overlap_nodes() -> Float[np.ndarray, " nodes"]:
     """The grid: below its first node all is seen, beyond its last nothing, whatever the parameters."""
     return np.geomspace(_LEAST, _MOST, NODES).astype(np.float32)
 

@@ -101,7 +101,7 @@ def _sums(
     return jax.vmap(at)(footprints)
 
 
-def table_loss(table: LossTable, point: Float[Array | np.ndarray, "parameters"]) -> Float[Array, ""]:
+def table_loss(table: LossTable, point: Float[Array | np.ndarray, " parameters"]) -> Float[Array, ""]:
     """The loss of one view at a point between `LOWEST_POINT` and `HIGHEST_POINT`; differentiable."""
     point = jnp.asarray(point)
     starts, weights = zip(
@@ -121,7 +121,7 @@ def table_loss(table: LossTable, point: Float[Array | np.ndarray, "parameters"])
     )
 
 
-def default_point(parameters: ArtistParameters) -> Float32[np.ndarray, "parameters"]:
+def default_point(parameters: ArtistParameters) -> Float32[np.ndarray, " parameters"]:
     """Where `parameters` lie in the unit cube of `AUTO_PARAMETERS`."""
     given = parameters.as_dict()
     return np.array([place_of(parameter_spec(name), given[name]) for name in AUTO_PARAMETERS], np.float32)

@@ -54,8 +54,8 @@ class PriorScene:
     name: str
     statistics: Float32[np.ndarray, "rows statistics"]
     table: LossTable
-    vpl_count: Int32[np.ndarray, "rows"]
-    fitted: Bool[np.ndarray, "rows"]
+    vpl_count: Int32[np.ndarray, " rows"]
+    fitted: Bool[np.ndarray, " rows"]
     """Whether the row's view is one that a fit may see."""
 
 

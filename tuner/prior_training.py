@@ -55,12 +55,12 @@ class TrainingRows:
 
     statistics: Float[Array, "rows statistics"]
     table: LossTable
-    fit_loss: Float[Array, "rows"]
+    fit_loss: Float[Array, " rows"]
     """Of the scene's own fit at that VPL count, at this view."""
-    default_loss: Float[Array, "rows"]
-    weight: Float[Array, "rows"]
+    default_loss: Float[Array, " rows"]
+    weight: Float[Array, " rows"]
     """Sums to 1 over all rows; the same for each scene, and within it for each VPL count."""
-    scene: Int32[Array, "rows"]
+    scene: Int32[Array, " rows"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +152,7 @@ def _objective(
 
 @jax.jit
 def _trained(
-    rows: TrainingRows, left_out: Bool[Array, "scenes"], statistics: Float[Array, "rows statistics"]
+    rows: TrainingRows, left_out: Bool[Array, " scenes"], statistics: Float[Array, "rows statistics"]
 ) -> Weights:
     share = jnp.where(left_out[rows.scene], 0.0, rows.weight)
     share = share / share.sum()
@@ -186,7 +186,7 @@ def _fitted_points(tables: LossTable) -> Float[Array, "scenes parameters"]:
     return jax.lax.map(_fitted_point, tables, batch_size=16)
 
 
-def _fitted_point(table: LossTable) -> Float[Array, "parameters"]:
+def _fitted_point(table: LossTable) -> Float[Array, " parameters"]:
     """The best of the descents from the defaults and from softer starts."""
     moves = jnp.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.15, 0.3, 0.1], [0.0, 0.0, -0.2, -0.3]])
     starts = jnp.clip(DEFAULT + moves, LOWEST_POINT, HIGHEST_POINT)
@@ -219,6 +219,6 @@ def _fitted_point(table: LossTable) -> Float[Array, "parameters"]:
 
 
 @jax.jit
-def row_losses(rows: TrainingRows, points: Float[Array, "rows parameters"]) -> Float[Array, "rows"]:
+def row_losses(rows: TrainingRows, points: Float[Array, "rows parameters"]) -> Float[Array, " rows"]:
     """The loss of every row, each at its point."""
     return _each(rows.table, points)

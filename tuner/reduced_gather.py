@@ -31,11 +31,11 @@ class ReducedGather:
     """One view. |picture − target|² + offset is its loss."""
 
     factor: Float[Array, "rows nodes"]
-    target: Float[Array, "rows"]
+    target: Float[Array, " rows"]
     offset: Float[Array, ""]
     """−Σ w (a − b)²/4: what the reference's noise adds to the square of the residuals."""
-    distance: Float[Array, "distances"]
-    footprint: Float[Array, "footprints"]
+    distance: Float[Array, " distances"]
+    footprint: Float[Array, " footprints"]
 
 
 def reduce_gather(binned: BinnedGather, target: Target) -> ReducedGather:
@@ -45,7 +45,7 @@ def reduce_gather(binned: BinnedGather, target: Target) -> ReducedGather:
 
 def reduce_columns(
     irradiance: Float[Array, "receivers 3 nodes"], target: Target
-) -> tuple[Float[Array, "rows nodes"], Float[Array, "rows"], Float[Array, ""]]:
+) -> tuple[Float[Array, "rows nodes"], Float[Array, " rows"], Float[Array, ""]]:
     """Factor, target and offset of the least-squares problem for any picture `irradiance` · x."""
     gram, offset = _gram(irradiance, target)
     values, vectors = np.linalg.eigh(np.asarray(gram, np.float64).sum(axis=0))
@@ -53,7 +53,7 @@ def reduce_columns(
     return jnp.asarray(factor[:, :-1], jnp.float32), jnp.asarray(factor[:, -1], jnp.float32), offset
 
 
-def reduced_picture(reduced: ReducedGather, parameters: FalloffParameters) -> Float[Array, "rows"]:
+def reduced_picture(reduced: ReducedGather, parameters: FalloffParameters) -> Float[Array, " rows"]:
     """The weighted picture, rotated into the small problem's rows."""
     falloff = node_falloff(reduced.distance, reduced.footprint, parameters)
     return parameters.intensity * jnp.matmul(reduced.factor, falloff, precision=jax.lax.Precision.HIGHEST)

@@ -12,7 +12,7 @@ from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_visibility import map_visibility
 
 
-def scene_statistics(captured: CapturedFrame) -> Float64[np.ndarray, "statistics"]:
+def scene_statistics(captured: CapturedFrame) -> Float64[np.ndarray, " statistics"]:
     """The statistics in the order of `STATISTIC_NAMES`."""
     found = {"vpl_count": np.log2(len(captured.vpl_flux)) / 16.0, "visible": 1.0}
     if captured.vpl_flux.any():
@@ -57,7 +57,7 @@ def _of_receivers(captured: CapturedFrame) -> dict[str, float]:
     }
 
 
-def _receivers(captured: CapturedFrame) -> tuple[Int64[np.ndarray, "n"], Int64[np.ndarray, "n"]]:
+def _receivers(captured: CapturedFrame) -> tuple[Int64[np.ndarray, " n"], Int64[np.ndarray, " n"]]:
     """Which of the sequence's points meet a surface, and which of the valid pixels they meet."""
     height, width = captured.valid.shape
     point = (0.5 + np.arange(RECEIVERS)[:, None] * np.array(R2_STEPS, np.float32)) % 1.0

@@ -143,10 +143,10 @@ def intervals(
 
 def _profile_ends(
     views: tuple[FitView, ...],
-    point: Float[np.ndarray, "parameters"],
+    point: Float[np.ndarray, " parameters"],
     axes: list[int],
-    allowed: Float[np.ndarray, "axes"],
-) -> tuple[Float[np.ndarray, "axes"], Float[np.ndarray, "axes"]]:
+    allowed: Float[np.ndarray, " axes"],
+) -> tuple[Float[np.ndarray, " axes"], Float[np.ndarray, " axes"]]:
     """Where the profile of each axis has risen by what is allowed; the cube's wall where it never does."""
     data, residuals = tuple(view.reduced for view in views), all_residuals(SearchSpace())
     free = np.isin(np.arange(len(point)), axes)
@@ -188,7 +188,7 @@ def _inverse(matrix: Float[np.ndarray, "n n"]) -> Float[np.ndarray, "n n"]:
 
 
 def _tiles(
-    views: tuple[FitView, ...], space: SearchSpace, point: Float[Array, "parameters"]
+    views: tuple[FitView, ...], space: SearchSpace, point: Float[Array, " parameters"]
 ) -> tuple[Float[np.ndarray, "tiles n"], Float[np.ndarray, "tiles n n"]]:
     """Jᵀr and JᵀJ of every tile of every view that has something to say."""
     parts = [_view_tiles(view, space, point) for view in views]
@@ -199,7 +199,7 @@ def _tiles(
 
 @partial(jax.jit, static_argnums=1)
 def _view_tiles(
-    view: FitView, space: SearchSpace, point: Float[Array, "parameters"]
+    view: FitView, space: SearchSpace, point: Float[Array, " parameters"]
 ) -> tuple[Float[Array, "tiles n"], Float[Array, "tiles n n"]]:
     target = view.target
     root, mean = jnp.sqrt(target.weight), (target.half_a + target.half_b) / 2.0

@@ -26,7 +26,7 @@ def attribute(node: XmlNode, key: str) -> str:
     return node.attributes[key]
 
 
-def numbers(node: XmlNode, key: str, count: int) -> Float64[np.ndarray, "count"]:
+def numbers(node: XmlNode, key: str, count: int) -> Float64[np.ndarray, " count"]:
     """`count` numbers from an attribute, separated by spaces or commas.
 
     Raises:

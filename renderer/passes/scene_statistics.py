@@ -68,6 +68,6 @@ class SceneStatisticsPass:
         """Bind what the prior reads."""
         self._buffer.bind_to_storage_buffer(buffer_bindings.SCENE_STATISTICS)
 
-    def read(self) -> Float32[np.ndarray, "statistics"]:
+    def read(self) -> Float32[np.ndarray, " statistics"]:
         """The statistics in their order: waits for the GPU."""
         return np.frombuffer(self._buffer.read(4 * len(STATISTIC_NAMES)), np.float32)

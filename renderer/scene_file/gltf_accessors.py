@@ -34,7 +34,7 @@ class Elements:
     def __len__(self) -> int:
         return len(self.stored)
 
-    def as_floats(self, rows: Int64[np.ndarray, "n"] | None = None) -> Float32[np.ndarray, "n components"]:
+    def as_floats(self, rows: Int64[np.ndarray, " n"] | None = None) -> Float32[np.ndarray, "n components"]:
         """The elements, or those of `rows`, as floats; normalised integers by glTF 2.0 section 3.11.
 
         Raises:

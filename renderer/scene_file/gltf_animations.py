@@ -151,7 +151,7 @@ def _channel(
     return [Channel(node, animated, _INTERPOLATIONS[name], times, values, tangents, duration=0.0)]
 
 
-def _times(elements: Elements, document: GltfDocument) -> Float64[np.ndarray, "keys"]:
+def _times(elements: Elements, document: GltfDocument) -> Float64[np.ndarray, " keys"]:
     document.decoded.spend(8 * len(elements), elements.where)
     times = elements.as_floats().astype(np.float64)[:, 0]
     if times[0] < 0.0 or (np.diff(times) <= 0.0).any():
@@ -196,7 +196,7 @@ def _with_ancestors(leaves: Sequence[int], parents: Sequence[int]) -> list[int]:
     return list(order)
 
 
-def _rows(nodes: Sequence[int], row_of: dict[int, int]) -> Int32[np.ndarray, "n"]:
+def _rows(nodes: Sequence[int], row_of: dict[int, int]) -> Int32[np.ndarray, " n"]:
     return np.array([row_of[node] for node in nodes], np.int32)
 
 

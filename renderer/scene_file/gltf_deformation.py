@@ -78,7 +78,7 @@ def morphed(
     primitive: JsonObject,
     weights: tuple[float, ...],
     accessors: GltfAccessors,
-    used: Int64[np.ndarray, "n"],
+    used: Int64[np.ndarray, " n"],
     vertex_count: int,
 ) -> Float32[np.ndarray, "n 3"]:
     """`base` plus the weighted displacements of the primitive's morph targets.
@@ -105,7 +105,7 @@ def morphed(
 
 
 def read_influences(
-    attributes: dict[str, Elements], used: Int64[np.ndarray, "n"], joint_count: int
+    attributes: dict[str, Elements], used: Int64[np.ndarray, " n"], joint_count: int
 ) -> tuple[Int32[np.ndarray, "n influences"], Float64[np.ndarray, "n influences"]]:
     """The joints that each vertex follows, and how much: rows of weights sum to 1.
 

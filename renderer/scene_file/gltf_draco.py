@@ -12,7 +12,7 @@ from renderer.scene_file.limits import DecodedBytes
 
 def decode_draco(
     accessors: GltfAccessors, primitive: JsonObject, compression: JsonObject, decoded: DecodedBytes
-) -> tuple[dict[str, Elements], Int64[np.ndarray, "corners"]]:
+) -> tuple[dict[str, Elements], Int64[np.ndarray, " corners"]]:
     """The vertex attributes and the triangle corners of a compressed primitive.
 
     Raises:

@@ -80,7 +80,7 @@ class GltfPrimitives:
 
     def _attributes_and_corners(
         self, primitive: JsonObject, base_color: BaseColor, deformation: Deformation
-    ) -> tuple[dict[str, Elements], Int64[np.ndarray, "corners"]]:
+    ) -> tuple[dict[str, Elements], Int64[np.ndarray, " corners"]]:
         compression = primitive.extension("KHR_draco_mesh_compression")
         attributes: dict[str, Elements] = {}
         corners = None
@@ -112,7 +112,7 @@ class GltfPrimitives:
             )
         return attributes, corners
 
-    def _corners(self, primitive: JsonObject, vertex_count: int) -> Int64[np.ndarray, "corners"]:
+    def _corners(self, primitive: JsonObject, vertex_count: int) -> Int64[np.ndarray, " corners"]:
         if "indices" not in primitive.members:
             self._document.decoded.spend(8 * vertex_count, primitive.where)
             return np.arange(vertex_count, dtype=np.int64)
@@ -132,7 +132,7 @@ class GltfPrimitives:
         self,
         primitive: JsonObject,
         attributes: dict[str, Elements],
-        used: Int64[np.ndarray, "used"],
+        used: Int64[np.ndarray, " used"],
         deformation: Deformation,
     ) -> tuple[Float32[np.ndarray, "used 3"], Float32[np.ndarray, "used 3"] | None, Skinning | None]:
         """Positions and normals of the used vertices, morphed, then skinned; and by what, if that moves."""
@@ -159,7 +159,7 @@ class GltfPrimitives:
         return *at_rest, Skinning(positions, bind_normals, joints, weights.astype(np.float32))
 
     def _uv(
-        self, attributes: dict[str, Elements], used: Int64[np.ndarray, "used"], base_color: BaseColor
+        self, attributes: dict[str, Elements], used: Int64[np.ndarray, " used"], base_color: BaseColor
     ) -> Float32[np.ndarray, "used 2"] | None:
         if base_color.uv_set is None:
             return None
@@ -175,7 +175,7 @@ class GltfPrimitives:
         return transformed_uv(uv, base_color.uv_transform)
 
     def _colors(
-        self, attributes: dict[str, Elements], used: Int64[np.ndarray, "used"]
+        self, attributes: dict[str, Elements], used: Int64[np.ndarray, " used"]
     ) -> Float32[np.ndarray, "used 3"] | None:
         if "COLOR_0" not in attributes:
             return None
@@ -197,7 +197,7 @@ def _is_wanted(semantic: str, base_color: BaseColor, deformation: Deformation) -
 
 
 def _triangles(
-    corners: Int64[np.ndarray, "corners"], mode: int, where: str
+    corners: Int64[np.ndarray, " corners"], mode: int, where: str
 ) -> Int64[np.ndarray, "triangles 3"]:
     """Triangles of a list, strip or fan, wound as glTF 2.0 section 3.7.2.1 says."""
     if mode == _TRIANGLES:

@@ -104,7 +104,7 @@ class JsonObject:
 
     def numbers(
         self, key: str, count: int, default: Sequence[float] | None = None
-    ) -> Float64[np.ndarray, "count"]:
+    ) -> Float64[np.ndarray, " count"]:
         value = default if key not in self.members and default is not None else self._required(key)
         if not isinstance(value, list | tuple) or len(value) != count or not all(map(_is_number, value)):
             raise self._wrong(key, f"a list of {count} finite numbers", value)

@@ -52,7 +52,7 @@ def decode_attributes(
 
 def _groups(
     content: bytes, end: int, count: int, stride: int, where: str
-) -> tuple[UInt8[np.ndarray, "groups"], Int64[np.ndarray, "groups"], list[tuple[int, int]]]:
+) -> tuple[UInt8[np.ndarray, " groups"], Int64[np.ndarray, " groups"], list[tuple[int, int]]]:
     """Mode and place of every group, and first element and size of every block.
 
     How long a group is stands in the group itself, so this is one walk through the stream.
@@ -91,7 +91,7 @@ def _sentinels_by_byte(bits: int) -> list[int]:
 
 
 def _with_sentinels(
-    stored: UInt8[np.ndarray, "bytes"], places: Int64[np.ndarray, "groups"], bits: int
+    stored: UInt8[np.ndarray, "bytes"], places: Int64[np.ndarray, " groups"], bits: int
 ) -> UInt8[np.ndarray, "groups 16"]:
     """Groups of 2 or 4 bits a difference; where all bits are set, the difference follows as a byte."""
     packed = stored[places[:, None] + np.arange(2 * bits)]

@@ -15,7 +15,7 @@ _INDICES_TAIL = 4
 _WORD = 0xFFFFFFFF
 
 
-def decode_triangles(content: bytes, count: int, where: str) -> UInt32[np.ndarray, "count"]:
+def decode_triangles(content: bytes, count: int, where: str) -> UInt32[np.ndarray, " count"]:
     """The `count` indices of a triangle list.
 
     Raises:
@@ -37,7 +37,7 @@ def decode_triangles(content: bytes, count: int, where: str) -> UInt32[np.ndarra
     return indices.ravel()
 
 
-def decode_indices(content: bytes, count: int, where: str) -> UInt32[np.ndarray, "count"]:
+def decode_indices(content: bytes, count: int, where: str) -> UInt32[np.ndarray, " count"]:
     """The `count` indices of any other list.
 
     Raises:

@@ -49,9 +49,9 @@ class PlyHeader:
 class PlyColumn:
     """One property over all rows of its element; of a list property, all rows' values one after another."""
 
-    values: Float64[np.ndarray, "values"]
+    values: Float64[np.ndarray, " values"]
     type: str
-    sizes: Int64[np.ndarray, "rows"] | None = None
+    sizes: Int64[np.ndarray, " rows"] | None = None
     """The length of each row's list; None for a scalar property."""
 
 
@@ -217,7 +217,7 @@ def _no_rows(p: PlyProperty) -> Int64[np.ndarray, "0"] | None:
     return np.empty(0, np.int64) if p.count_type else None
 
 
-def _ascii_numbers(body: bytes, decoded: DecodedBytes) -> Float64[np.ndarray, "numbers"]:
+def _ascii_numbers(body: bytes, decoded: DecodedBytes) -> Float64[np.ndarray, " numbers"]:
     decoded.spend(4 * len(body), "the data")
     words = body.split()
     longest = max(map(len, words), default=0)

@@ -95,8 +95,8 @@ def _surface(vertex: Columns, face: Columns, warnings: Warnings) -> Surface | No
 
 
 def _triangles(
-    corners: Int64[np.ndarray, "corners"],
-    sizes: Int64[np.ndarray, "faces"],
+    corners: Int64[np.ndarray, " corners"],
+    sizes: Int64[np.ndarray, " faces"],
     positions: Float64[np.ndarray, "vertices 3"],
     warnings: Warnings,
 ) -> Int64[np.ndarray, "triangles 3"]:
@@ -129,7 +129,7 @@ def _uv(vertex: Columns) -> Float32[np.ndarray, "rows 2"] | None:
     return None
 
 
-def _corner_uv(face: Columns, sizes: Int64[np.ndarray, "faces"]) -> Float32[np.ndarray, "corners 2"] | None:
+def _corner_uv(face: Columns, sizes: Int64[np.ndarray, " faces"]) -> Float32[np.ndarray, "corners 2"] | None:
     texcoord = face.get("texcoord")
     if texcoord is None or texcoord.sizes is None or not texcoord.values.size:
         return None

@@ -10,7 +10,7 @@ _MOST_CORNERS = 2000
 
 
 def triangulated(
-    sizes: Int64[np.ndarray, "faces"],
+    sizes: Int64[np.ndarray, " faces"],
     positions: Float64[np.ndarray, "corner_count 3"],
     where: str,
 ) -> Int64[np.ndarray, "triangles 3"]:
@@ -93,7 +93,7 @@ def _is_ear(flat: Float64[np.ndarray, "size 2"], left: list[int], at: int) -> bo
 
 
 def _turn(
-    start: Float64[np.ndarray, "2"], end: Float64[np.ndarray, "2"], point: Float64[np.ndarray, "2 *points"]
+    start: Float64[np.ndarray, "2"], end: Float64[np.ndarray, "2"], point: Float64[np.ndarray, " 2 *points"]
 ) -> np.float64 | Float64[np.ndarray, "*points"]:
     """Twice the signed area of the triangle, positive where it turns to the left."""
     return (end[0] - start[0]) * (point[1] - start[1]) - (end[1] - start[1]) * (point[0] - start[0])

@@ -73,8 +73,8 @@ def finished_mesh(
 
 
 def used_vertices(
-    corners: Int64[np.ndarray, "corners"], vertex_count: int
-) -> tuple[Int64[np.ndarray, "used"], Int64[np.ndarray, "corners"]]:
+    corners: Int64[np.ndarray, " corners"], vertex_count: int
+) -> tuple[Int64[np.ndarray, " used"], Int64[np.ndarray, " corners"]]:
     """Which of `vertex_count` vertices are referred to, rising, and the corners renumbered to them."""
     # A scene's primitives may all index one large vertex buffer: cost must follow the corners then.
     if len(corners) < vertex_count // 16:
@@ -87,7 +87,7 @@ def used_vertices(
 
 def _face_normals(
     positions: Float32[np.ndarray, "vertices 3"], triangles: Int64[np.ndarray, "triangles 3"]
-) -> tuple[Float32[np.ndarray, "triangles 3"], Bool[np.ndarray, "triangles"]]:
+) -> tuple[Float32[np.ndarray, "triangles 3"], Bool[np.ndarray, " triangles"]]:
     """Unit normals by winding, and which triangles have area (the others' normals are zero)."""
     normals = np.zeros((len(triangles), 3), np.float32)
     has_area = np.zeros(len(triangles), bool)
@@ -132,7 +132,7 @@ def _smooth(
 
 def unit_rows(
     rows: Float64[np.ndarray, "n 3"],
-) -> tuple[Float32[np.ndarray, "n 3"], Bool[np.ndarray, "n"]]:
+) -> tuple[Float32[np.ndarray, "n 3"], Bool[np.ndarray, " n"]]:
     """The rows at unit length, and which of them are longer than zero (the others stay zero)."""
     length = np.linalg.norm(rows, axis=1, keepdims=True)
     unit = np.divide(rows, length, out=np.zeros_like(rows), where=length > 0.0)
@@ -146,7 +146,7 @@ def _without_unused_vertices(surface: Surface) -> Surface:
     return replace(_gathered(surface, used), triangles=corners.reshape(-1, 3))
 
 
-def _gathered(surface: Surface, rows: Int64[np.ndarray, "rows"]) -> Surface:
+def _gathered(surface: Surface, rows: Int64[np.ndarray, " rows"]) -> Surface:
     """The surface with vertex i taken from old vertex rows[i]; triangles are left as they were."""
     return Surface(
         surface.positions[rows],

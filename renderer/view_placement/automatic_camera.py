@@ -159,7 +159,7 @@ def _picture_score(space: FreeSpace, camera: Camera) -> float:
     )
 
 
-def _eye_height_weight(space: FreeSpace, positions: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, "n"]:
+def _eye_height_weight(space: FreeSpace, positions: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, " n"]:
     """1 from 0.3 to 0.6 of the way from floor to ceiling, falling to 0.3 either side and without a floor."""
     fraction = height_fraction(space, positions)
     outside = np.maximum(0.3 - fraction, 0.0) + np.maximum(fraction - 0.6, 0.0)

@@ -30,7 +30,7 @@ class Places:
     front: Bool[np.ndarray, "places directions"]
     """Hits from the front."""
 
-    def walled_in(self) -> Bool[np.ndarray, "places"]:
+    def walled_in(self) -> Bool[np.ndarray, " places"]:
         hits = self.hit.sum(axis=1)
         return (hits >= WALLED_IN * self.hit.shape[1]) & (self.front.sum(axis=1) >= FROM_FRONT * hits)
 
@@ -54,7 +54,7 @@ def is_room(space: FreeSpace) -> bool:
     return free_places(space).share_walled_in() >= ROOM_SHARE
 
 
-def height_fraction(space: FreeSpace, positions: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, "n"]:
+def height_fraction(space: FreeSpace, positions: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, " n"]:
     """Height above the floor as a share of floor to ceiling; 0 without a floor.
 
     Under the open sky the top of the grid stands in for the ceiling.

@@ -55,7 +55,7 @@ class FreeSpace:
         x, y, z = self.occupied.shape
         return x, y, z
 
-    def clearance_at(self, positions: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, "n"]:
+    def clearance_at(self, positions: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, " n"]:
         """Clearance at positions in voxel units; outside the grid, the distance to the grid on top."""
         limit = np.array(self.shape) - 1
         index = np.clip(np.floor(positions).astype(np.int64), 0, limit)
@@ -125,7 +125,7 @@ def _sample_counts(
 
 def _surface_samples(
     triangles: Float64[np.ndarray, "triangles 3 3"], voxel: float
-) -> Iterator[tuple[Int64[np.ndarray, "n"], Float64[np.ndarray, "n 3"], Float64[np.ndarray, "n"]]]:
+) -> Iterator[tuple[Int64[np.ndarray, " n"], Float64[np.ndarray, "n 3"], Float64[np.ndarray, " n"]]]:
     """Lattice points in rows along each longest edge: triangle, position, share of the triangle's area."""
     counts = _sample_counts(triangles, voxel)
     per_triangle = counts.prod(axis=1)
@@ -231,7 +231,7 @@ def _span_in_grid(
     origins: Float64[np.ndarray, "n 3"],
     directions: Float64[np.ndarray, "n 3"],
     upper: Float64[np.ndarray, "3"],
-) -> tuple[Float64[np.ndarray, "n"], Float64[np.ndarray, "n"]]:
+) -> tuple[Float64[np.ndarray, " n"], Float64[np.ndarray, " n"]]:
     """Where rays enter and leave the box from 0 to `upper` (slab test), entering no earlier than at 0."""
     # So close to a slab's plane a direction counts as parallel to it; the ray leaves the grid long before.
     steep = np.where(np.abs(directions) < 1e-9, np.copysign(1e-9, directions), directions)

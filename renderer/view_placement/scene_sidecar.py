@@ -128,7 +128,7 @@ def _check_keys(table: Any, allowed: tuple[str, ...], where: str) -> None:
 
 def _numbers(
     table: dict[str, Any], key: str, counts: tuple[int, ...], where: str
-) -> Float64[np.ndarray, "n"]:
+) -> Float64[np.ndarray, " n"]:
     if key not in table:
         raise InputError(f"{where}: key '{key}' is missing")
     value = table[key]

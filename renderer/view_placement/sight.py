@@ -115,7 +115,7 @@ def light_hits(space: FreeSpace, light: Light) -> RayHits:
     return march_from(space, space.to_voxels(light.position_world), directions)
 
 
-def lit(space: FreeSpace, light: Light, points: Float64[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
+def lit(space: FreeSpace, light: Light, points: Float64[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
     """Which surface points (voxel units, within half a voxel) direct light of this light reaches."""
     if light.kind == "directional":
         # Marched from outside the grid, so that a point need not be left first.

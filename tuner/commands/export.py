@@ -22,6 +22,7 @@ from tuner.commands.view_options import (
 if TYPE_CHECKING:
     from renderer.scene_bundle import SceneBundle
     from renderer.tuned_config import TunedConfig
+    from tuner.commands.chosen_view import ChosenView
 
 Form = Literal["json", "glsl", "c", "std140", "gltf", "bundle", "web"]
 WITH_SCENE = ("gltf", "bundle", "web")

@@ -32,11 +32,11 @@ class UnitTriangles:
     triangles: UInt32[np.ndarray, "triangles 3"]
     geometric_normals: Float32[np.ndarray, "triangles 3"]
     """Unit length by winding; zero for a triangle without area, which no ray hits."""
-    triangle_textures: UInt32[np.ndarray, "triangles"]
+    triangle_textures: UInt32[np.ndarray, " triangles"]
     """Row of `textures`; row 0 is a single white texel, for materials without a texture."""
     textures: UInt32[np.ndarray, "textures 5"]
     """First texel, width, height, and the wrap modes along u and v as places in `WRAP_MODES`."""
-    texels: UInt32[np.ndarray, "texels"]
+    texels: UInt32[np.ndarray, " texels"]
     """sRGB bytes, red lowest."""
 
     def to_unit(self, points_world: Float[np.ndarray, "*n 3"]) -> Float64[np.ndarray, "*n 3"]:
@@ -127,7 +127,7 @@ def _texture_row(scene: Scene, mesh: Mesh) -> int:
 
 def _packed_textures(
     scene: Scene,
-) -> tuple[UInt32[np.ndarray, "textures 5"], UInt32[np.ndarray, "texels"]]:
+) -> tuple[UInt32[np.ndarray, "textures 5"], UInt32[np.ndarray, " texels"]]:
     rows = [(0, 1, 1, 0, 0)]
     texels = [np.array([0xFFFFFF], np.uint32)]
     first = 1

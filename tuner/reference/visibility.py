@@ -47,7 +47,7 @@ def ray_traced_visibility(
     return visible
 
 
-def _unoccluded(traced: TracedScene, tables: list, pair, count: int) -> Bool[np.ndarray, "count"]:
+def _unoccluded(traced: TracedScene, tables: list, pair, count: int) -> Bool[np.ndarray, " count"]:
     w = traced.wavefront
     receivers, normals, vpls, vpl_normals = tables
     lane = w.lanes(count)

@@ -7,7 +7,7 @@
 #if defined(CASTING) || defined(LIGHTING)
 layout(std430, binding = 4) readonly buffer Vpls { vec4 vpls[]; };  // position, footprint; normal; flux
 // What a ray met: normal, distance; or -1 - the number of a block. Blocks lie after the maps of all VPLs.
-layout(std430, binding = 5) buffer Maps { vec4 maps[]; };
+layout(std430, binding = 5) coherent buffer Maps { vec4 maps[]; };
 const int map_texels = map_size * map_size, block_texels = map_refinement * map_refinement;
 
 int block_start(float number) { return vpls.length() / 3 * map_texels + int(number) * block_texels; }

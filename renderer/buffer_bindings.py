@@ -34,6 +34,8 @@ VISIBILITY_DETAILS = 28
 VISIBILITY_EDGES = 29
 VPL_SAMPLES = 30
 VPL_OWNERS = 31
+COUNT = 32
+"""All of them. A driver may have as few as 8, those we know have 80 and more: `gpu_context` asks."""
 
 DEFINES = {
     "SCENE_INSTANCES_BINDING": SCENE_INSTANCES,

@@ -56,6 +56,8 @@ class CapturedFrame:
 
 def capture_frame(frame: Frame, view: View) -> CapturedFrame:
     """Read back everything that `frame` holds of `view`, which it has just drawn."""
+    context = frame.gbuffer.depth.ctx
+    context.memory_barrier(context.BUFFER_UPDATE_BARRIER_BIT)
     depth_buffer = read_picture(frame.gbuffer.depth)
     valid = depth_buffer > 0.0
     near_plane = np.float32(frame.camera(view).near_plane)
@@ -117,6 +119,7 @@ def read_picture(texture: moderngl.Texture) -> np.ndarray:
 
     Normalised 16-bit channels come back as float32 in [0, 1], other types as they are stored.
     """
+    texture.ctx.memory_barrier(texture.ctx.TEXTURE_UPDATE_BARRIER_BIT)
     values = np.frombuffer(texture.read(alignment=1), _DTYPES[texture.dtype])
     if texture.dtype == "nu2":
         values = values.astype(np.float32) / np.float32(65535.0)

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import moderngl
 
+from renderer import buffer_bindings
 from renderer.errors import MachineError
 
 REQUIRED_VERSION = 450
@@ -28,7 +29,7 @@ def create_context() -> moderngl.Context:
     to be tuned to a scene's units.
 
     Raises:
-        MachineError: no EGL device, or an OpenGL older than 4.5.
+        MachineError: no EGL device, an OpenGL older than 4.5, or too few bindings of storage buffers.
     """
     try:
         context = moderngl.create_context(standalone=True, backend="egl")
@@ -42,6 +43,13 @@ def create_context() -> moderngl.Context:
         context.release()
         raise MachineError(
             f"OpenGL {REQUIRED_VERSION} is needed, {name} offers {version}; run: vpltune doctor"
+        )
+    bindings = context.info["GL_MAX_SHADER_STORAGE_BUFFER_BINDINGS"]
+    if bindings < buffer_bindings.COUNT:
+        name = context.info["GL_RENDERER"]
+        context.release()
+        raise MachineError(
+            f"{buffer_bindings.COUNT} storage buffers are needed at once, {name} binds {bindings}"
         )
     # "auto" would free objects from whichever thread drops them; ours wait for `free_dropped`.
     context.gc_mode = "context_gc"

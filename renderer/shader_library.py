@@ -10,6 +10,9 @@ import numpy as np
 Define = int | float | bool | str
 """A number, or a piece of GLSL on one line."""
 
+MOST_WORKGROUPS = 65535
+"""Along one side of a dispatch: what every driver takes ; every compute shader knows it."""
+
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 # Mesa: "0:12(5): error: …"; NVIDIA: "0(12) : error C1008: …".
 _ERROR_PLACE = re.compile(r"\b(\d+)(?::(\d+)(\(\d+\))|\((\d+)\) ?)(?=\s*:)")
@@ -91,7 +94,7 @@ def load_compute(
     Raises:
         ShaderError: with the driver's log, file names and lines put right.
     """
-    source = ShaderSource(f"{name}.comp", defines or {})
+    source = ShaderSource(f"{name}.comp", {"MOST_WORKGROUPS": MOST_WORKGROUPS, **(defines or {})})
     try:
         return context.compute_shader(source.text)
     except moderngl.Error as error:

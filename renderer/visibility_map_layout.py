@@ -8,9 +8,9 @@ TEXEL_BYTES = 8
 """A distance and a packed normal, or the place of finer texels: shaders/common/vpl_visibility.glsl."""
 _LARGEST_SHARE = 0.4
 """Of the texels, how many may be cast finer. 3 to 12 % are at a silhouette in rooms, 28 % in the busiest of
-sixteen scenes; where there is no room left, a texel stays coarse."""
-_MOST_BLOCKS = 1 << 20
-"""At 4² texels a block 128 MiB, which every driver takes in one storage buffer."""
+sixteen scenes. Where there is no room left texels stay coarse: which ones, may differ from frame to frame."""
+_MOST_DETAIL_BYTES = 1 << 27
+"""What every driver takes in one storage buffer: with blocks of 4², some 18,000 default maps of a room."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,8 @@ class VisibilityMapLayout:
         """Blocks of finer texels that there is room for."""
         if self.refinement == 1:
             return 0
-        return min(int(_LARGEST_SHARE * vpl_count * self.size**2), _MOST_BLOCKS)
+        most = _MOST_DETAIL_BYTES // (self.refinement**2 * TEXEL_BYTES)
+        return min(int(_LARGEST_SHARE * vpl_count * self.size**2), most)
 
 
 NO_MAPS = VisibilityMapLayout(0, 1)

@@ -36,7 +36,7 @@ shared VirtualPointLight batch[64];
 
 ivec2 own_pixel(int subset) {
     if (LISTED_PIXELS != 0) {
-        return listed_pixel(gl_WorkGroupID.x * 64u + gl_LocalInvocationIndex);
+        return listed_pixel(gl_WorkGroupID.xy, gl_LocalInvocationIndex);
     }
     ivec2 place = ivec2(subset % INTERLEAVE, subset / INTERLEAVE);
     return ivec2(gl_GlobalInvocationID.xy) * INTERLEAVE + place;

@@ -3,23 +3,29 @@
 #include "common/scene_length.glsl"
 #include "common/virtual_point_lights.glsl"
 
+// 32 KiB with the largest maps, which is what every driver has.
 const int TEXELS = VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE;
 shared uvec2 whole_map[TEXELS];  // as it was cast: entries of the map change under the neighbours' eyes
 #define SILHOUETTE_ENTRY(texel) whole_map[texel.y * VISIBILITY_MAP_SIZE + texel.x]
 #include "common/visibility_silhouette.glsl"
 #include "common/visibility_edges.glsl"
+#include "common/visibility_workgroup.glsl"
 
 layout(local_size_x = 64) in;
 
 uniform float longest;  // the scene's diagonal [world units]
 
 void main() {
-    int start = int(gl_WorkGroupID.x) * TEXELS;
+    int vpl_index = workgroup_vpl();
+    if (vpl_index >= vpl_count) {
+        return;
+    }
+    int start = vpl_index * TEXELS;
     for (int i = int(gl_LocalInvocationIndex); i < TEXELS; i += 64) {
         whole_map[i] = visibility_maps[start + i];
     }
     barrier();
-    float farthest = 1.5 * longest / scene_length;
+    float farthest = VISIBILITY_FARTHEST * longest / scene_length;
     for (int i = int(gl_LocalInvocationIndex); i < TEXELS; i += 64) {
         if (!is_silhouette(ivec2(i % VISIBILITY_MAP_SIZE, i / VISIBILITY_MAP_SIZE), farthest)) {
             continue;
@@ -29,7 +35,7 @@ void main() {
             visibility_edges[block] = uint(start + i);
             visibility_maps[start + i] = visibility_block(block);
             uint groups = ((block + 1u) * uint(VISIBILITY_BLOCK_TEXELS) + 63u) / 64u;
-            atomicMax(visibility_edge_groups[0], min(groups, MOST_GROUPS));
+            atomicMax(visibility_edge_groups[0], min(groups, uint(MOST_WORKGROUPS)));
         }
     }
 }

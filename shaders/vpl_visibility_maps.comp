@@ -1,11 +1,15 @@
 // A small map of the surfaces each VPL sees: one ray for each texel of its hemisphere, through the hierarchy.
 // One workgroup for each VPL.
 #include "common/visibility_ray.glsl"
+#include "common/visibility_workgroup.glsl"
 
 layout(local_size_x = 64) in;
 
 void main() {
-    int vpl_index = int(gl_WorkGroupID.x);
+    int vpl_index = workgroup_vpl();
+    if (vpl_index >= vpl_count) {
+        return;
+    }
     VirtualPointLight vpl = virtual_point_lights[vpl_index];
     const int texels = VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE;
     for (int i = int(gl_LocalInvocationIndex); i < texels; i += 64) {

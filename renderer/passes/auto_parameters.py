@@ -47,7 +47,10 @@ class AutoParametersPass:
         self._prior.bind_to_storage_buffer(buffer_bindings.AUTO_PRIOR)
         self._state.bind_to_storage_buffer(buffer_bindings.AUTO_STATE)
         self._program.run(1)
-        self._context.memory_barrier(self._context.SHADER_STORAGE_BARRIER_BIT)
+        # The parameters may be read back, or set by the program.
+        self._context.memory_barrier(
+            self._context.SHADER_STORAGE_BARRIER_BIT | self._context.BUFFER_UPDATE_BARRIER_BIT
+        )
 
 
 def _prior_bytes(prior: AutoPrior) -> bytes:

@@ -87,8 +87,11 @@ class InterleavedFilterPass:
         irradiance.bind_to_image(0, read=False, write=True)
         self._program.run(-(-irradiance.width // 8), -(-irradiance.height // 8))
         context = self._context
+        # The listed pixels are written once more; the next frame empties the list before it is filled.
         context.memory_barrier(
             context.TEXTURE_FETCH_BARRIER_BIT
+            | context.SHADER_IMAGE_ACCESS_BARRIER_BIT
             | context.SHADER_STORAGE_BARRIER_BIT
             | context.COMMAND_BARRIER_BIT
+            | context.BUFFER_UPDATE_BARRIER_BIT
         )

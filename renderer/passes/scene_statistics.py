@@ -62,7 +62,10 @@ class SceneStatisticsPass:
         for program, groups in ((self._sums, _GROUPS), (self._ratios, 1)):
             set_uniforms(program, vpl_count=vpl_count)
             program.run(groups)
-            self._context.memory_barrier(self._context.SHADER_STORAGE_BARRIER_BIT)
+            # What is measured may be read back.
+            self._context.memory_barrier(
+                self._context.SHADER_STORAGE_BARRIER_BIT | self._context.BUFFER_UPDATE_BARRIER_BIT
+            )
 
     def bind(self) -> None:
         """Bind what the prior reads."""

@@ -28,7 +28,8 @@ class ToneMappingPass:
         if exposure is None:
             set_uniforms(self._measure, radiance=0)
             self._measure.run(1)
-            context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT)
+            # The exposure may be read back, or given by the program next time.
+            context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT | context.BUFFER_UPDATE_BARRIER_BIT)
         else:
             self._exposure.write(np.float32(exposure).tobytes())
         set_uniforms(self._program, radiance=0)

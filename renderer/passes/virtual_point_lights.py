@@ -62,7 +62,7 @@ class VirtualPointLightsPass:
         """Place the VPLs, by the densities γ and η and the importance that are bound: chance ∝ flux^γ · F.
 
         `table_rotation` shifts the point table on its torus, in [0, 1)². Where `sample_count` is not 0, so
-        many more are placed in `samples`, from the R2 sequence, which hold all light once more.
+        many are placed in `samples` instead, from the R2 sequence, which share all light among them.
         """
         for binding, buffer in self._buffers.items():
             buffer.bind_to_storage_buffer(binding)
@@ -77,9 +77,10 @@ class VirtualPointLightsPass:
         context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT)
         rsm.bind(self._placement, 0)
         set_uniforms(self._placement, rows=rsm.rows, table_rotation=table_rotation)
-        self._place(self.count)
         if sample_count > 0:
             self._place_samples(sample_count)
+        else:
+            self._place(self.count)
 
     def bind(self) -> None:
         """Bind what the gather reads."""

@@ -42,8 +42,9 @@ class VplCellsPass:
         context = self._context
         samples.bind_to_storage_buffer(buffer_bindings.VPL_SAMPLES)
         self._owner_buffer.bind_to_storage_buffer(buffer_bindings.VPL_OWNERS)
+        # Of what a shader has written a copy knows after this barrier alone; itself, it needs none.
+        context.memory_barrier(context.BUFFER_UPDATE_BARRIER_BIT)
         context.copy_buffer(vpls, samples, size=vpls.size)
-        context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT)
         set_uniforms(self._owners, vpl_count=self._vpl_count, sample_count=self.sample_count)
         set_uniforms(self._cells, sample_count=self.sample_count)
         for _ in range(steps):

@@ -5,7 +5,7 @@ import numpy as np
 
 from renderer import buffer_bindings
 from renderer.ray_hierarchy import RAY_DEFINES, RayHierarchy
-from renderer.shader_library import load_compute, set_uniforms
+from renderer.shader_library import MOST_WORKGROUPS, load_compute, set_uniforms
 from renderer.visibility_map_layout import TEXEL_BYTES, VisibilityMapLayout
 
 _NO_EDGES = np.array([0, 1, 1, 0], np.uint32).tobytes()
@@ -40,23 +40,29 @@ class VplVisibilityMapsPass:
         """Cast the maps of the VPLs that are bound; `longest` is the scene's diagonal in world units."""
         hierarchy.bind()
         self.bind()
-        self._run(self._maps_program, longest)
+        context = self._context
+        self._run_for_maps(self._maps_program, longest)
+        context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT)
         if self._refines:
             self._edges.write(_NO_EDGES)
             self._edges.bind_to_storage_buffer(buffer_bindings.VISIBILITY_EDGES)
-            self._run(self._edges_program, longest)
+            self._run_for_maps(self._edges_program, longest)
+            # The next frame empties the list before it is filled.
+            context.memory_barrier(
+                context.SHADER_STORAGE_BARRIER_BIT
+                | context.COMMAND_BARRIER_BIT
+                | context.BUFFER_UPDATE_BARRIER_BIT
+            )
             set_uniforms(self._details_program, longest=longest)
             self._details_program.run_indirect(self._edges)
-            self._context.memory_barrier(self._context.SHADER_STORAGE_BARRIER_BIT)
+            context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT)
 
     def bind(self) -> None:
         """Bind what the gather reads."""
         self.maps.bind_to_storage_buffer(buffer_bindings.VISIBILITY_MAPS)
         self.details.bind_to_storage_buffer(buffer_bindings.VISIBILITY_DETAILS)
 
-    def _run(self, program: moderngl.ComputeShader, longest: float) -> None:
-        set_uniforms(program, longest=longest)
-        program.run(self._vpl_count)
-        self._context.memory_barrier(
-            self._context.SHADER_STORAGE_BARRIER_BIT | self._context.COMMAND_BARRIER_BIT
-        )
+    def _run_for_maps(self, program: moderngl.ComputeShader, longest: float) -> None:
+        set_uniforms(program, longest=longest, vpl_count=self._vpl_count)
+        columns = min(self._vpl_count, MOST_WORKGROUPS)
+        program.run(columns, -(-self._vpl_count // columns))

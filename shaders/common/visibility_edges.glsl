@@ -7,5 +7,4 @@ layout(std430, binding = VISIBILITY_EDGES_BINDING) buffer VisibilityEdges {
     uint visibility_edges[];         // [block]: its texel, counted over all maps
 };
 
-const uint MOST_GROUPS = 65535u;  // that every driver takes in one dispatch
 const int VISIBILITY_BLOCK_TEXELS = VISIBILITY_MAP_REFINEMENT * VISIBILITY_MAP_REFINEMENT;

@@ -21,6 +21,8 @@ layout(std430, binding = VISIBILITY_DETAILS_BINDING) buffer VisibilityDetails {
 const uint VISIBILITY_BLOCK_BIT = 0x80000000u;
 // What meets nothing ends so many diagonals of the scene away, at a wall that faces the VPL: no receiver is behind it.
 const float VISIBILITY_NOTHING = 2.0;
+// What meets something ends nearer than so many.
+const float VISIBILITY_FARTHEST = 1.5;
 
 // What a VPL sees, in its frame.
 struct MetSurface {

@@ -19,7 +19,7 @@ void main() {
     if (index < vpl_count * TEXELS) {
         map_start = index - index % TEXELS;
         ivec2 texel = ivec2(index % SIZE, (index % TEXELS) / SIZE);
-        if (is_silhouette(texel, 1.5 * longest / measured_scene_length())) {
+        if (is_silhouette(texel, VISIBILITY_FARTHEST * longest / measured_scene_length())) {
             out_texel = visibility_block(uint(index));
         }
     }

@@ -48,9 +48,7 @@ def create_context() -> moderngl.Context:
     if bindings < buffer_bindings.COUNT:
         name = context.info["GL_RENDERER"]
         context.release()
-        raise MachineError(
-            f"{buffer_bindings.COUNT} storage buffers are needed at once, {name} binds {bindings}"
-        )
+        raise MachineError(f"{buffer_bindings.COUNT} storage buffers must be bound, {name} binds {bindings}")
     # "auto" would free objects from whichever thread drops them; ours wait for `free_dropped`.
     context.gc_mode = "context_gc"
     clip_control = _gl_function("glClipControl", None, ctypes.c_uint, ctypes.c_uint)

@@ -12,6 +12,7 @@ from PIL import Image
 from renderer.errors import MachineError
 from renderer.image_file import read_exr
 from renderer.runtime import Runtime
+from renderer.runtime_options import RuntimeOptions
 from renderer.scene_file import read_scene
 from renderer.views import View, write_views
 from tuner.__main__ import run
@@ -54,6 +55,25 @@ def test_every_layer_is_a_picture_and_an_exr(views_path, tmp_path, layer):
     assert pixels.dtype == np.float32
     assert np.isfinite(pixels).all()
     assert pixels.max() > 0.0
+
+
+def test_maps_are_the_runtimes_unless_asked_otherwise(views_path, tmp_path, capfd):
+    """As fine as `RuntimeOptions` has them, which the help states."""
+    drawn = {}
+    for refinement in (None, 1):
+        more = () if refinement is None else (f"--map-refinement={refinement}",)
+        assert render(views_path, tmp_path / "a.exr", "--layer", "irradiance", *more) == 0
+        drawn[refinement] = read_exr(tmp_path / "a.exr")
+    scene = read_scene(SCENE)
+    (camera,) = scene.cameras
+    ours = Runtime(scene, "default").render(View("front", "fitted", SIZE, camera, scene.lights), "irradiance")
+    np.testing.assert_array_equal(drawn[None], ours)
+    assert (drawn[1] != ours).any()
+    capfd.readouterr()
+    assert run(["render", "--help"]) == 0
+    shown = capfd.readouterr().out
+    for default in (RuntimeOptions.visibility_map_size, RuntimeOptions.visibility_map_refinement):
+        assert f"[{default}]" in shown
 
 
 def test_interleaved_pictures_are_near_the_full_one(views_path, tmp_path):

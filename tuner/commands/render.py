@@ -66,9 +66,11 @@ def render(
         ),
     ] = None,
     map_refinement: Annotated[
-        int,
-        typer.Option(metavar="1|2|4|8", help="How many times finer maps are at silhouettes."),
-    ] = 4,
+        int | None,
+        typer.Option(
+            metavar="1|2|4|8", help="How many times finer maps are at silhouettes. [4]", show_default=False
+        ),
+    ] = None,
     rsm_resolution: Annotated[
         int | None,
         typer.Option(
@@ -118,7 +120,7 @@ def render(
     factor = checked_scale(scale)
     if interleave not in INTERLEAVES:
         raise InputError(f"--interleave: must be one of {INTERLEAVES}, got {interleave}")
-    if map_refinement not in REFINEMENTS:
+    if map_refinement is not None and map_refinement not in REFINEMENTS:
         raise InputError(f"--map-refinement: must be one of {REFINEMENTS}, got {map_refinement}")
     tuned = read_config(config).seen_by(visibility)
 
@@ -138,7 +140,7 @@ def render(
     options = RuntimeOptions(
         interleave=interleave,
         visibility_map_size=map_size or RuntimeOptions.visibility_map_size,
-        visibility_map_refinement=map_refinement,
+        visibility_map_refinement=map_refinement or RuntimeOptions.visibility_map_refinement,
         # A clip is eased over a quarter of a second; a still takes what it asks for.
         adaptation_frames=0.0 if frames is None else fps / 4.0,
     )

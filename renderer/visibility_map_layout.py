@@ -6,6 +6,14 @@ from renderer.runtime_options import RuntimeOptions
 
 TEXEL_BYTES = 8
 """A distance and a packed normal, or the place of finer texels: shaders/common/vpl_visibility.glsl."""
+VISIBILITY_LIFT = 0.01
+VISIBILITY_LEAST_LIFT = 1e-3
+"""Rays start, and distances count, from a point lifted off the VPL's surface: by so many footprints, and by
+this share of L at least. What an RSM holds lies off its surface by as much as interpolated depth rounds, some
+1e-4 of L, and a VPL behind its own surface would see nothing else."""
+FRAME_TURNS_OVER = -0.5
+"""Of a normal's z: where the tangents of a map turn over. Not at 0, where walls have their normals, and where
+rounding would decide."""
 _LARGEST_SHARE = 0.4
 """Of the texels, how many may be cast finer. 3 to 12 % are at a silhouette in rooms, 28 % in the busiest of
 sixteen scenes. Where there is no room left texels stay coarse: which ones, may differ from frame to frame."""
@@ -29,9 +37,15 @@ class VisibilityMapLayout:
         return cls(options.visibility_map_size, options.visibility_map_refinement)
 
     @property
-    def defines(self) -> dict[str, int]:
+    def defines(self) -> dict[str, int | float]:
         """What a shader that includes `common/vpl_visibility.glsl` is compiled with."""
-        return {"VISIBILITY_MAP_SIZE": self.size, "VISIBILITY_MAP_REFINEMENT": self.refinement}
+        return {
+            "VISIBILITY_MAP_SIZE": self.size,
+            "VISIBILITY_MAP_REFINEMENT": self.refinement,
+            "VISIBILITY_LIFT": VISIBILITY_LIFT,
+            "VISIBILITY_LEAST_LIFT": VISIBILITY_LEAST_LIFT,
+            "FRAME_TURNS_OVER": FRAME_TURNS_OVER,
+        }
 
     def blocks(self, vpl_count: int) -> int:
         """Blocks of finer texels that there is room for."""

@@ -10,11 +10,9 @@ from jaxtyping import Array, Float, Float32, Int
 
 from renderer.artist_parameters import ArtistParameters
 from renderer.capture import CapturedFrame, VisibilityMaps
+from renderer.visibility_map_layout import FRAME_TURNS_OVER, VISIBILITY_LEAST_LIFT, VISIBILITY_LIFT
 from tuner.virtual_point_lights import Receivers, VirtualPointLights
 
-VISIBILITY_LIFT = 0.01
-VISIBILITY_LEAST_LIFT = 1e-3
-"""Lift of a map's origin off its surface: footprints, and units of L at least. Twins in GLSL."""
 CHUNK = 128
 """Receivers at once: 128 × 1,024 pairs are half a MiB an array, nine with vectors."""
 _PADDINGS = 4
@@ -62,10 +60,6 @@ def hemi_octahedral_decode(encoded: Float[Array, "*n 2"]) -> Float[Array, "*n 3"
     y = (encoded[..., 0] - encoded[..., 1]) / 2.0
     direction = jnp.stack([x, y, 1.0 - jnp.abs(x) - jnp.abs(y)], axis=-1)
     return direction / jnp.linalg.norm(direction, axis=-1, keepdims=True)
-
-
-FRAME_TURNS_OVER = -0.5
-"""Where tangents turn over: not at z = 0, where walls have their normals, and where rounding would decide."""
 
 
 def hemisphere_frame(normal: Float[Array, "vpls 3"]) -> Float[Array, "vpls 3 3"]:

@@ -15,6 +15,7 @@ from renderer.errors import InputError
 from renderer.passes.tone_mapping import EXPOSURE_KEY
 from renderer.scene_bundle import SceneBundle
 from renderer.shader_library import Define, ShaderSource
+from renderer.visibility_map_layout import VisibilityMapLayout
 
 VPL_COLUMNS = 64
 """VPLs in a row of the textures that hold them."""
@@ -91,6 +92,7 @@ def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
 
 
 def _defines(document: dict[str, Any]) -> dict[str, Define]:
+    maps = document["visibility_maps"]
     return {
         "LIGHT_COUNT": len(document["lights"]),
         "RSM_FACE_COUNT": len(document["rsm"]["faces"]),
@@ -98,8 +100,7 @@ def _defines(document: dict[str, Any]) -> dict[str, Define]:
         "RSM_FILTERING": document["rsm"]["filtering"],
         "VPL_COLUMNS": VPL_COLUMNS,
         "DATA_COLUMNS": DATA_COLUMNS,
-        "VISIBILITY_MAP_SIZE": document["visibility_maps"]["map_size"],
-        "VISIBILITY_MAP_REFINEMENT": document["visibility_maps"]["map_refinement"],
+        **VisibilityMapLayout(maps["map_size"], maps["map_refinement"]).defines,
         "RAY_COUNT_BITS": COUNT_BITS,
         "RAY_STACK_SIZE": _TREE_DEPTH,
         "EXPOSURE_KEY": EXPOSURE_KEY,

@@ -11,10 +11,8 @@ vec3 hemi_octahedral_decode(vec2 encoded) {
     return normalize(vec3(p, 1.0 - abs(p.x) - abs(p.y)));
 }
 
-// Tangents that make a right-handed frame with a unit normal (Duff et al. 2017). They turn over between two
-// halves of the sphere: not at z = 0, where walls have their normals, and where rounding would decide.
-const float FRAME_TURNS_OVER = -0.5;
-
+// Tangents that make a right-handed frame with a unit normal (Duff et al. 2017). They turn over between two parts of
+// the sphere.
 mat3 hemisphere_frame(vec3 normal) {
     float s = normal.z >= FRAME_TURNS_OVER ? 1.0 : -1.0;
     float a = -1.0 / (s + normal.z);

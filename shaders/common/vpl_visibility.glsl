@@ -35,12 +35,7 @@ struct VisibilityParameters {
     float softness;  // of the distance, over which light then fades out
 };
 
-// Rays start, and distances count, from a point lifted off the VPL's surface: by this many footprints, and by
-// this share of L at least. What an RSM holds lies off its surface by as much as interpolated depth rounds, some
-// 1e-4 of L, and a VPL behind its own surface would see nothing else.
-const float VISIBILITY_LIFT = 0.01;
-const float VISIBILITY_LEAST_LIFT = 1e-3;
-
+// Where rays start, and distances count from.
 vec3 visibility_origin(VirtualPointLight vpl, float scene_length) {
     float lift = max(VISIBILITY_LIFT * vpl.position_footprint.w, VISIBILITY_LEAST_LIFT * scene_length);
     return vpl.position_footprint.xyz + vpl.normal_area.xyz * lift;

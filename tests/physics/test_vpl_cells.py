@@ -160,5 +160,4 @@ def test_cells_steady_a_swept_light(gl_context):
             )
         second = np.diff(np.array(pictures, np.float64), n=2, axis=0)
         changes[relaxation] = np.abs(second).mean() / np.mean(pictures)
-    print(changes)
     assert changes[4] < changes[0], changes

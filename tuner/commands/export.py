@@ -6,10 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from renderer.errors import InputError
-from tuner.commands.options import (
-    JsonOption,
-    VisibilityOption,
-)
+from tuner.commands.options import JsonOption, VisibilityOption
 from tuner.commands.report import Report, warn
 from tuner.commands.view_options import (
     PictureSizeOption,

@@ -124,6 +124,8 @@ class Frame:
     ) -> None:
         """Draw `view` up to the irradiance buffers."""
         camera = self.camera(view)
+        # Passes write into pictures that the last frame's may still be reading.
+        self._context.memory_barrier(self._context.SHADER_IMAGE_ACCESS_BARRIER_BIT)
         self._bind_lights(records)
         self.parameters.write(parameters)
         self.parameters.bind()

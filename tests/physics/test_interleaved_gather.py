@@ -224,6 +224,19 @@ def test_uneven_subsets_ask_for_a_full_gather(gl_context):
     assert listed == 31 * 31
 
 
+@pytest.mark.parametrize(("interleave", "tolerance"), [(2, 0.02), (8, 0.05)])
+def test_fewer_vpls_than_pixels_of_a_block(gl_context, interleave, tolerance):
+    """One VPL for 4 or 64 pixels: what is lit asks for a full gather, and the energy is nearly that of one.
+
+    What is missed: windows at an edge that lack the one pixel with the VPL, and take themselves for dark.
+    """
+    view = room_view("spot", (48, 36))
+    full, shared = (captured(gl_context, colored_room(), view, n, vpl_count=1) for n in (1, interleave))
+    light, expected = shared.vpl_irradiance[full.valid], full.vpl_irradiance[full.valid]
+    assert np.isfinite(light).all()
+    assert energy_ratio(light, expected) == pytest.approx(1.0, abs=tolerance)
+
+
 def error_and_energy(gl_context, path, visibility):
     """relMSE and energy ratio of 1,024 VPLs shared out by 4×4 against the full gather, at 640×360."""
     scene = read_scene(path)

@@ -50,6 +50,15 @@ def test_one_vpl_has_a_map(gl_context, refinement):
     assert 0.5 < seen.mean() / free.vpl_irradiance.mean() < 1.0
 
 
+def test_in_the_dark_no_vpl_sees_anything(gl_context):
+    """Without a light, and so without L, no ray is cast, no silhouette found and no NaN made."""
+    config = TunedConfig(ArtistParameters(vpl_count=3), visibility="maps")
+    captured = Runtime(colored_room(), config, context=gl_context).capture(room_view(None, (16, 12)))
+    assert not captured.vpl_irradiance.any()
+    assert (captured.visibility_maps.block == -1).all()
+    assert np.isfinite(captured.visibility_maps.distance).all()
+
+
 def test_the_most_vpls_have_maps(gl_context):
     """More workgroups than a driver need take along one side: the last maps are cast as all others are."""
     most = int(parameter_spec("vpl_count").high)

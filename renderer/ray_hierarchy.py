@@ -56,7 +56,7 @@ class _Placed:
 
 
 class RayHierarchy:
-    """The buffers behind `ray_distance` and `ray_blocked`.
+    """The buffers behind `ray_hit` of shaders/common/ray_hierarchy.glsl.
 
     Takes 48 bytes for each triangle of a mesh and 33 to 61 for the boxes around it (64 for each pair of
     nodes), however often the mesh is placed; and 128 for each instance. Building takes about 1 µs for each

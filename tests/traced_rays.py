@@ -19,9 +19,8 @@ void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i < rays.length()) {
         Ray ray = rays[i];
-        distances[i] = vec2(
-            ray_distance(ray.origin, ray.direction, ray.longest),
-            ray_blocked(ray.origin, ray.direction, ray.longest) ? 1.0 : 0.0);
+        RayHit hit = ray_hit(ray.origin, ray.direction, ray.longest);
+        distances[i] = vec2(hit.distance, hit.triangle != RAY_NO_TRIANGLE ? 1.0 : 0.0);
     }
 }
 """
@@ -30,7 +29,7 @@ Trace = Callable[..., tuple[np.ndarray, np.ndarray]]
 
 
 def ray_tracer(context: moderngl.Context) -> Trace:
-    """(hierarchy, origins, directions, longest) → distances, blocked; on the GPU."""
+    """(hierarchy, origins, directions, longest) → distances, and whether anything was met; on the GPU."""
     source = ShaderSource("common/ray_hierarchy.glsl", RAY_DEFINES)
     program = context.compute_shader(source.text + _MAIN)
 

@@ -31,11 +31,6 @@ class FitStatus(enum.Enum):
         """Whether there was nothing that could be fitted."""
         return self.outcome != "ok"
 
-    @property
-    def start_kept(self) -> bool:
-        """Whether the result is the start itself."""
-        return self.nothing_fitted or self is FitStatus.NO_IMPROVEMENT
-
 
 @dataclass(frozen=True, eq=False)
 class Descent:

@@ -43,12 +43,12 @@ struct RayHit {
 
 const uint RAY_NO_TRIANGLE = 0xFFFFFFFFu;
 
-RayHit traverse_rays(vec3 origin_world, vec3 direction_world, float longest, bool any_hit) {
+// What the unit direction meets first; nothing farther than `longest`, which is then the distance.
+RayHit ray_hit(vec3 origin_world, vec3 direction_world, float longest) {
     uint stack[RAY_STACK_SIZE];
     int height = 1;
     stack[0] = RAY_DONE;
     float nearest = min(longest, 0.5 * RAY_MISS);
-    float reach = nearest;
     SpaceRay ray = space_ray(origin_world, direction_world);
     bool in_instance = false;
     uint instance = 0u;
@@ -86,9 +86,6 @@ RayHit traverse_rays(vec3 origin_world, vec3 direction_world, float longest, boo
                     hit = RayHit(met, i, instance);
                 }
             }
-            if (any_hit && nearest < reach) {
-                break;
-            }
             current = stack[--height];
         } else {
             instance = first;
@@ -103,11 +100,6 @@ RayHit traverse_rays(vec3 origin_world, vec3 direction_world, float longest, boo
     return hit;
 }
 
-// What the unit direction meets first; nothing farther than `longest`.
-RayHit ray_hit(vec3 origin_world, vec3 direction_world, float longest) {
-    return traverse_rays(origin_world, direction_world, longest, false);
-}
-
 // Unit normal in the world of the triangle that was met, towards the ray's origin.
 vec3 ray_hit_normal(RayHit hit, vec3 direction_world) {
     RayTriangle triangle = ray_triangles[hit.triangle];
@@ -118,14 +110,4 @@ vec3 ray_hit_normal(RayHit hit, vec3 direction_world) {
     across /= max(max(size.x, size.y), max(size.z, 1e-30));
     vec3 normal = normalize((ray_instances[hit.instance].world_to_instance * across).xyz);
     return dot(normal, direction_world) > 0.0 ? -normal : normal;
-}
-
-// Distance along the unit direction to the nearest surface; `longest` where there is none nearer.
-float ray_distance(vec3 origin_world, vec3 direction_world, float longest) {
-    return traverse_rays(origin_world, direction_world, longest, false).distance;
-}
-
-// Whether anything stands on the unit direction nearer than `longest`.
-bool ray_blocked(vec3 origin_world, vec3 direction_world, float longest) {
-    return traverse_rays(origin_world, direction_world, longest, true).triangle != RAY_NO_TRIANGLE;
 }

@@ -43,10 +43,10 @@ def assert_traced_right(trace, scene, hierarchy, count, seed, transforms=None, b
     triangles = world_triangles(scene, transforms)
     bounds = np.stack([triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))]) if bounds is None else bounds
     origins, directions = rays_within(bounds, count, seed)
-    found, is_blocked = trace(hierarchy, origins, directions)
+    found, is_met = trace(hierarchy, origins, directions)
     expected = nearest_distances(triangles, origins, directions)
     assert_same_hits(found, expected, np.linalg.norm(bounds[1] - bounds[0]))
-    np.testing.assert_array_equal(is_blocked, np.isfinite(found))
+    np.testing.assert_array_equal(is_met, np.isfinite(found))
 
 
 def soup(count, seed, size=0.1):
@@ -117,8 +117,8 @@ def test_no_leak_between_neighbours(gl_context, trace):
     origins = np.float32([0.1, -0.2, 1.5]) + random.normal(scale=0.1, size=targets.shape).astype(np.float32)
     directions = targets - origins
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    found, is_blocked = trace(hierarchy, origins, directions)
-    assert is_blocked.all()
+    found, is_met = trace(hierarchy, origins, directions)
+    assert is_met.all()
     np.testing.assert_allclose(found, np.linalg.norm(targets - origins, axis=1), rtol=1e-5)
 
 
@@ -128,18 +128,18 @@ def test_longest_ends_the_ray(gl_context, trace):
     origins, directions = rays_within(0.8 * scene.bounds(), 2000, seed=5)
     free, _ = trace(hierarchy, origins, directions)
     meets = np.isfinite(free)
-    for factor, blocked in ((0.999, False), (1.001, True)):
+    for factor, met in ((0.999, False), (1.001, True)):
         longest = factor * free[meets]
-        found, is_blocked = trace(hierarchy, origins[meets], directions[meets], longest)
-        assert (is_blocked == blocked).all()
-        np.testing.assert_array_equal(found, free[meets] if blocked else longest)
+        found, is_met = trace(hierarchy, origins[meets], directions[meets], longest)
+        assert (is_met == met).all()
+        np.testing.assert_array_equal(found, free[meets] if met else longest)
 
 
 def test_rays_that_meet_nothing_keep_their_length(gl_context, trace):
     hierarchy, _ = hierarchy_of(gl_context, scene_of([soup(50, 6)], [(0.5, 0.5, 0.5)]))
-    found, is_blocked = trace(hierarchy, np.full((10, 3), 20.0), np.tile([0.0, 1.0, 0.0], (10, 1)), 7.0)
+    found, is_met = trace(hierarchy, np.full((10, 3), 20.0), np.tile([0.0, 1.0, 0.0], (10, 1)), 7.0)
     assert (found == 7.0).all()
-    assert not is_blocked.any()
+    assert not is_met.any()
 
 
 def test_rays_from_surfaces(gl_context, trace):

@@ -1,20 +1,32 @@
 """What a search asks: the loss at a point of the unit cube, by the runtime's frames or by the surrogate."""
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
-from renderer.artist_parameters import ArtistParameters
+from renderer.artist_parameters import ArtistParameters, parameter_spec
 from renderer.capture import read_picture
+from renderer.frame import Frame
 from renderer.runtime import Runtime
 from tuner.captured_view import CapturedView
-from tuner.losses.relative_squared_error import EVEN_SHARE, target_of
-from tuner.search_space import SearchSpace
+from tuner.fit_density import Rotation
+from tuner.losses.relative_squared_error import EVEN_SHARE, Target, target_of, weighted_squared_error
+from tuner.search_space import FALLOFF_SPECS, VISIBILITY_SPECS, SearchSpace
+from tuner.virtual_point_lights import gather_inputs
+from tuner.vpl_gather import FalloffParameters, gather
+from tuner.vpl_visibility import VisibilityParameters, map_texels, seen_share, surface_overlap
 
 Point = np.ndarray
+
+PLACED_SPECS = (parameter_spec("density_exponent"), parameter_spec("density_importance"))
+SURROGATE_SPACE = SearchSpace((*FALLOFF_SPECS, *VISIBILITY_SPECS))
+"""What the surrogate knows of: where VPLs stand is for the runtime to say."""
+SPACE = SearchSpace((*SURROGATE_SPACE.specs, *PLACED_SPECS))
+"""All continuous parameters that are fitted."""
 
 
 class SearchIsOver(Exception):  # noqa: N818 - nothing has gone wrong
@@ -31,10 +43,11 @@ class Trace:
     points: list[Point] = field(default_factory=list)
     evaluations: int = 0
     spent_seconds: float = 0.0
+    spent_frames: int = 0
 
     def add(self, point: Point, loss: float, seconds: float, frames: int) -> None:
         self.evaluations += 1
-        self.spent_seconds = seconds
+        self.spent_seconds, self.spent_frames = seconds, frames
         if not self.losses or loss < self.losses[-1]:
             self.seconds.append(seconds)
             self.frames.append(frames)
@@ -42,37 +55,83 @@ class Trace:
             self.points.append(np.array(point))
 
 
-class RuntimeLoss:
-    """The fit's own loss of what the runtime draws: every view drawn, read back and compared, each time."""
+class CountingRuntime(Runtime):
+    """A runtime that knows how many frames it has drawn."""
 
-    def __init__(self, runtime: Runtime, views: tuple[CapturedView, ...], base: ArtistParameters):
-        self._runtime, self._views, self._base = runtime, views, base
-        self._space = SearchSpace()
-        self._targets = [
-            target_of(
-                view.reference.irradiance_a[view.valid], view.reference.irradiance_b[view.valid], EVEN_SHARE
-            )
-            for view in views
-        ]
+    frames = 0
+
+    def _draw(self, *arguments: object, **keywords: object) -> Frame:
+        self.frames += 1
+        return super()._draw(*arguments, **keywords)
+
+
+class RuntimeLoss:
+    """The fit's own loss of what the runtime draws: every view drawn at every rotation of the point table,
+    read back and compared, each time."""
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        views: Sequence[CapturedView],
+        rotations: Sequence[Rotation],
+        base: ArtistParameters,
+    ):
+        self._runtime, self._views, self._rotations, self._base = runtime, views, rotations, base
         # As numpy arrays: what they cost to compare is not to be JAX's start of a computation.
-        self._targets = [tuple(map(np.asarray, (t.half_a, t.half_b, t.weight))) for t in self._targets]
-        self.frames = 0
+        self._targets = [
+            tuple(np.asarray(part) for part in (target.half_a, target.half_b, target.weight))
+            for target in map(_target, views)
+        ]
 
     def __call__(self, point: Point) -> float:
-        self._runtime.parameters = self._space.parameters(point, self._base)
+        self._runtime.parameters = SPACE.parameters(point, self._base)
         return self.of_pictures(self._drawn)
 
-    def of_pictures(self, picture_of: Callable[[CapturedView], np.ndarray]) -> float:
+    def of_pictures(self, picture_of: Callable[[CapturedView, Rotation], np.ndarray]) -> float:
         """The loss of any pictures, [height, width, 3] each."""
         losses = []
         for view, (half_a, half_b, weight) in zip(self._views, self._targets, strict=True):
-            values = picture_of(view)[view.valid].astype(np.float64)
-            losses.append(float((weight * (values - half_a) * (values - half_b)).sum()))
+            for rotation in self._rotations:
+                values = picture_of(view, rotation)[view.valid].astype(np.float64)
+                losses.append(float((weight * (values - half_a) * (values - half_b)).sum()))
         return float(np.mean(losses))
 
-    def _drawn(self, view: CapturedView) -> np.ndarray:
-        self.frames += 1
-        return read_picture(self._runtime._draw(view.view).indirect_irradiance)[..., :3]
+    def _drawn(self, view: CapturedView, rotation: Rotation) -> np.ndarray:
+        return read_picture(self._runtime._draw(view.view, rotation).indirect_irradiance)[..., :3]
+
+
+class SurrogateLoss:
+    """The same of the surrogate, at points of `SURROGATE_SPACE`, for VPLs that stand where they were captured."""
+
+    def __init__(self, views: Sequence[CapturedView], rest: ArtistParameters):
+        self._rest = FalloffParameters.of(rest)
+        pairs = []
+        for view in views:
+            receivers, vpls = gather_inputs(view.captured, view.fitted_pixels(view.valid.size, 0))
+            assert view.captured.visibility_maps is not None, "captured without visibility maps"
+            overlap = surface_overlap(receivers, vpls, map_texels(view.captured.visibility_maps))
+            pairs.append((receivers, vpls, overlap, _target(view)))
+        self._pairs = tuple(pairs)
+
+    def __call__(self, point: Point) -> float:
+        return float(_surrogate_loss(jnp.asarray(point, jnp.float32), self._pairs, self._rest))
+
+
+@jax.jit
+def _surrogate_loss(point: jax.Array, pairs: tuple, rest: FalloffParameters) -> jax.Array:
+    values = SURROGATE_SPACE.values(point)
+    visibility = VisibilityParameters(*(values.pop(spec.name) for spec in VISIBILITY_SPECS))
+    falloff = replace(rest, **values)
+    losses = [
+        weighted_squared_error(gather(receivers, vpls, falloff, seen_share(overlap, visibility)), target)
+        for receivers, vpls, overlap, target in pairs
+    ]
+    return jnp.mean(jnp.stack(losses))
+
+
+def _target(view: CapturedView) -> Target:
+    halves = (half[view.valid] for half in (view.reference.irradiance_a, view.reference.irradiance_b))
+    return target_of(*halves, EVEN_SHARE)
 
 
 class CappedObjective:
@@ -98,12 +157,3 @@ class CappedObjective:
         if self.trace.evaluations >= self._evaluations or elapsed >= self._seconds:
             raise SearchIsOver
         return loss
-
-
-def surrogate_loss(squares: Callable[[jax.Array], jax.Array], offset: float) -> Callable[[Point], float]:
-    """The fit's loss at a point, from a compiled function of it."""
-
-    def loss(point: Point) -> float:
-        return float(squares(np.asarray(point, np.float32))) + offset
-
-    return loss

@@ -97,6 +97,14 @@ def fit_visibility(
     return replace(start, **found), descent
 
 
+def visibility_at_falloff(
+    views: tuple[CapturedView, ...], start: ArtistParameters, *, seed: int = 0
+) -> ArtistParameters:
+    """`start` with the bias and softness that are best at its own falloff: half a turn of `fit_visibility`."""
+    chosen = [_view_of(view, seed + index) for index, view in enumerate(views)]
+    return fit_visibility_to(tuple(_reduced(view, start) for view in chosen), start)[0]
+
+
 def fit_visibility_to(
     views: tuple[ReducedVisibility, ...], start: ArtistParameters
 ) -> tuple[ArtistParameters, Descent]:

@@ -16,6 +16,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from scipy.linalg.lapack import dpstrf
 
 from tuner.binned_gather import BinnedGather, node_falloff
 from tuner.losses.relative_squared_error import Target
@@ -23,6 +24,8 @@ from tuner.vpl_gather import FalloffParameters
 
 ROWS_AT_ONCE = 1024
 """Summed in float32; the sums of these are added in float64."""
+ROUNDING = 1e-7
+"""Of the largest sum of squares: float32's."""
 
 
 @jax.tree_util.register_dataclass
@@ -47,9 +50,13 @@ def reduce_columns(
     irradiance: Float[Array, "receivers 3 nodes"], target: Target
 ) -> tuple[Float[Array, "rows nodes"], Float[Array, " rows"], Float[Array, ""]]:
     """Factor, target and offset of the least-squares problem for any picture `irradiance` · x."""
-    gram, offset = _gram(irradiance, target)
-    values, vectors = np.linalg.eigh(np.asarray(gram, np.float64).sum(axis=0))
-    factor = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+    chunks, offset = _gram(irradiance, target)
+    gram = np.asarray(chunks, np.float64).sum(axis=0)
+    # Of a semidefinite matrix (Higham 1990), and twenty times sooner than its eigenvectors. It ends where
+    # what is left is no more than rounding.
+    upper, pivots, rank, _ = dpstrf(gram, tol=ROUNDING * np.diagonal(gram).max())
+    factor = np.zeros_like(gram)
+    factor[:rank, pivots - 1] = np.triu(upper)[:rank]
     return jnp.asarray(factor[:, :-1], jnp.float32), jnp.asarray(factor[:, -1], jnp.float32), offset
 
 

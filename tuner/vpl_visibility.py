@@ -1,7 +1,7 @@
 """What VPLs see, from their visibility maps, in JAX: the twin of shaders/common/vpl_visibility.glsl."""
 
 from dataclasses import dataclass, field
-from functools import partial
+from functools import lru_cache, partial
 
 import jax
 import jax.numpy as jnp
@@ -92,6 +92,7 @@ def map_texels(maps: VisibilityMaps) -> MapTexels:
     )
 
 
+@lru_cache
 def _axes(size: int) -> Float32[np.ndarray, "size size 3"]:
     """Directions of a map's texels. Twin: `visibility_axis` in GLSL."""
     centers = (jnp.arange(size) + 0.5) * (2.0 / size) - 1.0

@@ -9,9 +9,8 @@ from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
 from tuner.captured_view import CapturedView
 from tuner.fit_density import (
-    DensityTrial,
     fit_density,
-    response_minimum,
+    parabola_minimum,
     rotation_errors,
     table_rotations,
 )
@@ -68,24 +67,18 @@ def test_nothing_lit_is_a_status(gl_context):
     assert len(fit.trials) == 1
 
 
-def test_the_response_surface_finds_the_bottom_of_a_bowl():
-    """Of the exponential of a quadratic form, noise of 2 % moves its minimum by less than 0.15."""
-    random = np.random.default_rng(0)
-    for _ in range(20):
-        target = random.random(2)
-        trials = []
-        for exponent in (0.0, 0.5, 1.0):
-            for importance in (0.0, 0.5, 1.0):
-                bowl = (exponent - target[0]) ** 2 + 2.0 * (importance - target[1]) ** 2
-                loss = float(np.exp(bowl) * (1.0 + 0.02 * random.standard_normal()))
-                trials.append(DensityTrial(exponent, importance, 4, loss))
-        assert np.abs(np.array(response_minimum(trials)) - target).max() < 0.15
+def test_the_parabola_finds_the_bottom_of_a_bowl():
+    """Of the exponential of a parabola exactly; held at the ends; and a ridge has its lower end."""
+    places = (0.0, 0.5, 1.0)
+    for target, found in ((0.3, 0.3), (0.85, 0.85), (1.4, 1.0), (-0.2, 0.0)):
+        losses = [float(np.exp(2.0 * (place - target) ** 2)) for place in places]
+        assert parabola_minimum(places, losses) == pytest.approx(found)
+    assert parabola_minimum(places, [2.0, 3.0, 1.0]) == 1.0
 
 
-def test_losses_below_zero_do_not_break_the_surface():
+def test_losses_below_zero_do_not_break_the_parabola():
     """Free of the reference's noise, a perfect fit may end a little below 0."""
-    trials = [DensityTrial(x, y, 4, x**2 + y**2 - 0.001) for x in (0.0, 0.5, 1.0) for y in (0.0, 0.5, 1.0)]
-    assert response_minimum(trials) == (0.0, 0.0)
+    assert parabola_minimum((0.0, 0.5, 1.0), [-0.001, 0.249, 0.999]) == 0.0
 
 
 def test_rotations_are_common_and_held_out_ones_are_others():

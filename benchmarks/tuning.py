@@ -1,52 +1,71 @@
 """How long a fit takes to come within 1 % of the best loss that anyone finds, against searches of today.
 
-Every search minimises the fit's own loss over all continuous parameters that are fitted, once by drawing
-every view with the real runtime, reading it back and comparing it, and once with our surrogate in the
-runtime's place. What a search finds on the surrogate is judged by the runtime. Seconds are of tuning alone:
-scene, references, shaders and compiled functions are there before, for all. out/tuning/<scene>.json has what
-each search found and when; `python scripts/tuning_table.py` prints it as a table.
+All continuous parameters are free: k, α, κ, β, σ, γ and η, of few VPLs with visibility maps and cells. Every
+search minimises the fit's own loss, by drawing every view with the real runtime, reading it back and
+comparing it. Ours is `tuner.fit_density` on the same views.
+
+The surrogate does not know where VPLs will stand, so it takes the runtime's place for the first five of the
+seven: a search with `_surrogate` has the placements that ours tried, in that order, each captured anew, and
+looks for the five at each. What it finds is judged by the runtime. It tells what least squares are worth; the
+rest is the surrogate's.
+
+Seconds are of tuning alone: scene, references, shaders and compiled functions are there before, for all. A
+search may take SECONDS_OVER_OURS times as long as ours, so one that never arrives has about that as the
+bound of its ratio. out/tuning/<scene>.json has what each search found and when; `python
+scripts/tuning_table.py` prints it as a table.
 """
 
 import contextlib
 import json
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from benchmarks.open_formulas import babylon_irradiance, bgfx_irradiance
 from benchmarks.row import Row
 from benchmarks.scene_library import REPOSITORY, present_scenes
-from benchmarks.tuning_objectives import CappedObjective, RuntimeLoss, SearchIsOver, Trace, surrogate_loss
+from benchmarks.tuning_objectives import (
+    SPACE,
+    SURROGATE_SPACE,
+    CappedObjective,
+    CountingRuntime,
+    Point,
+    RuntimeLoss,
+    SearchIsOver,
+    SurrogateLoss,
+    Trace,
+)
 from benchmarks.tuning_searches import SEARCHES
 from renderer.artist_parameters import ArtistParameters
 from renderer.atomic_file import write_text_whole
 from renderer.capture import CapturedFrame
-from renderer.runtime import Runtime
 from renderer.strict_json import strict_json
 from renderer.tuned_config import TunedConfig
-from tuner.captured_view import CapturedView, capture_views
-from tuner.fit_falloff import fit_to, fit_views
-from tuner.fit_views import FitView
+from tuner.captured_view import CapturedView
+from tuner.fit_density import RELAXATION, Rotation, fit_density, rotated_views, table_rotations
 from tuner.prepare_scene import SceneOptions, Stopwatch, prepare_scene
-from tuner.reduced_gather import ReducedGather, reduced_picture
-from tuner.search_space import SearchSpace
-from tuner.vpl_gather import FalloffParameters
 
 SIZE = (64, 48)
-VPLS = 256
-FRAME_CAP = 300
-"""Frames that a search over the runtime may draw in a scene."""
-SURROGATE_CAP = 300
-"""Evaluations of a search over the surrogate."""
-OWN_RUNS = 5
-SECONDS_CAP = 20.0
+VPLS = 32
+VIEWS = 2
+ROTATIONS = 1
+"""Of the point table, for every view, the same for everyone: none but the runtime's own, so that a search has
+two frames to draw for a loss. With more, ours and theirs take longer alike."""
+RSM_RESOLUTION = 256
+"""Everyone's. A finer one makes frames dearer, and with them the searches: the bound would be higher."""
+SECONDS_OVER_OURS = 32.0
+"""Seconds that a search may take, over ours."""
+MOST_SECONDS = 70.0
+"""And no more than these: where frames take long, the bound is lower."""
+SURROGATE_CAP = 60
+"""Evaluations of a search over the surrogate, at each placement."""
+OWN_RUNS = 3
 WITHIN = 0.01
 SCENES = (
     "babylon-marble-tower",
@@ -81,19 +100,23 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 def measure_scene(name: str, path: Path) -> dict[str, Any]:
     """Every search on one scene; written to out/tuning/<name>.json and returned."""
     problem = _problem(path)
-    traces = {"ours": _ours(problem)}
+    ours, placements = _ours(problem)
+    traces = {"ours": ours}
+    seconds = min(SECONDS_OVER_OURS * ours.spent_seconds, MOST_SECONDS)
     for search, run in SEARCHES.items():
-        traces[search] = _searched(problem, run)
-        traces[f"{search}_surrogate"] = _searched_on_surrogate(problem, run)
+        traces[search] = _searched(problem, run, seconds)
+        traces[f"{search}_surrogate"] = _searched_on_surrogate(problem, run, placements, seconds)
     losses = {
         "default": problem.loss(problem.start),
-        "bgfx_formula": problem.loss.of_pictures(_formula(bgfx_irradiance)),
-        "babylon_formula": problem.loss.of_pictures(_formula(babylon_irradiance)),
+        "bgfx_formula": problem.loss.of_pictures(_formula(problem, bgfx_irradiance)),
+        "babylon_formula": problem.loss.of_pictures(_formula(problem, babylon_irradiance)),
     }
     document = {
         "scene": name,
-        "parameters": list(SearchSpace().names),
+        "parameters": list(SPACE.names),
         "views": len(problem.views),
+        "rotations": len(problem.rotations),
+        "seconds_cap": seconds,
         "losses": losses,
         "searches": {key: _told(trace) for key, trace in traces.items()},
     }
@@ -103,98 +126,95 @@ def measure_scene(name: str, path: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    runtime: Runtime
+    runtime: CountingRuntime
     views: tuple[CapturedView, ...]
+    rotations: tuple[Rotation, ...]
     base: ArtistParameters
+    """Where everyone begins: the defaults, but few VPLs with cells."""
     loss: RuntimeLoss
 
     @property
-    def start(self) -> np.ndarray:
-        return SearchSpace().point(self.base)
+    def start(self) -> Point:
+        return SPACE.point(self.base)
+
+    def captured(self, parameters: ArtistParameters) -> tuple[CapturedView, ...]:
+        return rotated_views(self.runtime, self.views, parameters, self.rotations)
 
 
 def _problem(path: Path) -> _Problem:
-    base = ArtistParameters(vpl_count=VPLS)
-    prepared = prepare_scene(
-        path, SceneOptions(size=SIZE), TunedConfig(base), Stopwatch(), lambda stage, share: None
-    )
+    base = ArtistParameters(vpl_count=VPLS, density_relaxation=RELAXATION)
+    config = TunedConfig(base, visibility="maps")
+    options = SceneOptions(size=SIZE, views=VIEWS)
+    prepared = prepare_scene(path, options, config, Stopwatch(), lambda stage, share: None)
+    runtime = CountingRuntime(prepared.scene, config, rsm_resolution=RSM_RESOLUTION)
     views = tuple(view for view in prepared.views if view.view.split == "fitted")
-    return _Problem(prepared.runtime, views, base, RuntimeLoss(prepared.runtime, views, base))
+    rotations = table_rotations(ROTATIONS, 0)
+    return _Problem(runtime, views, rotations, base, RuntimeLoss(runtime, views, rotations, base))
 
 
-def _captured(problem: _Problem) -> tuple[FitView, ...]:
-    """Frames drawn anew and read back, and made ready for the surrogate: what ours has to pay."""
-    problem.runtime.parameters = problem.base
-    given = tuple(view.view for view in problem.views)
-    captured = capture_views(problem.runtime, given, tuple(view.reference for view in problem.views))
-    return fit_views(captured, problem.base)
-
-
-def _ours(problem: _Problem) -> Trace:
-    """Capture, binning and fit; the median of some runs after one that compiles."""
+def _ours(problem: _Problem) -> tuple[Trace, list[ArtistParameters]]:
+    """The fit, the median of some runs after one that compiles; and the placements that it tried."""
     seconds = []
     for _ in range(1 + OWN_RUNS):
+        problem.runtime.frames = 0
         started = time.perf_counter()
-        tuned, _ = fit_to(_captured(problem), problem.base)
+        fit = fit_density(problem.runtime, problem.views, problem.base, rotations=problem.rotations)
         seconds.append(time.perf_counter() - started)
+    trace, point, frames = Trace(), SPACE.point(fit.parameters), problem.runtime.frames
+    trace.add(point, problem.loss(point), median(seconds[1:]), frames)
+    placements = [
+        replace(
+            problem.base,
+            density_exponent=trial.density_exponent,
+            density_importance=trial.density_importance,
+        )
+        for trial in fit.trials
+    ]
+    return trace, placements
+
+
+def _searched(problem: _Problem, run: Callable, seconds: float) -> Trace:
+    problem.loss(problem.start)
+    problem.runtime.frames = 0
     trace = Trace()
-    point = SearchSpace().point(tuned)
-    trace.add(point, problem.loss(point), median(seconds[1:]), len(problem.views))
+    with contextlib.suppress(SearchIsOver):
+        run(
+            CappedObjective(problem.loss, trace, lambda: problem.runtime.frames, seconds=seconds),
+            problem.start,
+        )
     return trace
 
 
-def _searched(problem: _Problem, run: Callable) -> Trace:
-    problem.loss(problem.start)
-    problem.loss.frames = 0
-    objective = CappedObjective(
-        problem.loss,
-        lambda: problem.loss.frames,
-        time.perf_counter(),
-        FRAME_CAP // len(problem.views),
-        SECONDS_CAP,
-    )
-    return _run(run, objective, problem.start)
-
-
-def _searched_on_surrogate(problem: _Problem, run: Callable) -> Trace:
-    _squares(jnp.zeros(len(problem.start)), _captured(problem), problem.base)
-    started = time.perf_counter()
-    views = _captured(problem)
-    offset = float(np.mean([view.reduced.offset for view in views]))
-    loss = surrogate_loss(lambda point: _squares(point, views, problem.base), offset)
-    frames = len(views)
-    objective = CappedObjective(loss, lambda: frames, started, SURROGATE_CAP, SECONDS_CAP)
-    trace = _run(run, objective, problem.start)
+def _searched_on_surrogate(
+    problem: _Problem, run: Callable, placements: Sequence[ArtistParameters], seconds: float
+) -> Trace:
+    start = SURROGATE_SPACE.point(problem.base)
+    SurrogateLoss(problem.captured(problem.base), problem.base)(start)
+    problem.runtime.frames = 0
+    trace, started = Trace(), time.perf_counter()
+    for placement in placements:
+        loss = SurrogateLoss(problem.captured(placement), placement)
+        found = len(trace.points)
+        objective = CappedObjective(
+            loss, trace, lambda: problem.runtime.frames, SURROGATE_CAP, seconds=seconds, started=started
+        )
+        with contextlib.suppress(SearchIsOver):
+            run(objective, start)
+        where = SPACE.point(placement)[len(start) :]
+        trace.points[found:] = [np.concatenate([point, where]) for point in trace.points[found:]]
     trace.losses = [problem.loss(point) for point in trace.points]
     return trace
 
 
-def _squares(point: jax.Array, views: tuple[FitView, ...], base: ArtistParameters) -> jax.Array:
-    return _reduced_squares(
-        jnp.asarray(point), tuple(view.reduced for view in views), FalloffParameters.of(base)
-    )
+def _formula(
+    problem: _Problem, irradiance: Callable[[CapturedFrame], np.ndarray]
+) -> Callable[[CapturedView, Rotation], np.ndarray]:
+    captured = iter(problem.captured(problem.base))
 
-
-@jax.jit
-def _reduced_squares(
-    point: jax.Array, reduced: tuple[ReducedGather, ...], rest: FalloffParameters
-) -> jax.Array:
-    parameters = replace(rest, **SearchSpace().values(point))
-    return sum(jnp.sum((reduced_picture(view, parameters) - view.target) ** 2) for view in reduced) / len(
-        reduced
-    )
-
-
-def _run(run: Callable, objective: CappedObjective, start: np.ndarray) -> Trace:
-    with contextlib.suppress(SearchIsOver):
-        run(objective, start)
-    return objective.trace
-
-
-def _formula(irradiance: Callable[[CapturedFrame], np.ndarray]) -> Callable[[CapturedView], np.ndarray]:
-    def picture(view: CapturedView) -> np.ndarray:
-        drawn = np.zeros((*view.captured.valid.shape, 3), np.float32)
-        drawn[view.captured.valid] = irradiance(view.captured)
+    def picture(view: CapturedView, rotation: Rotation) -> np.ndarray:
+        frame = next(captured).captured
+        drawn = np.zeros((*frame.valid.shape, 3), np.float32)
+        drawn[frame.valid] = irradiance(frame)
         return drawn
 
     return picture
@@ -204,6 +224,7 @@ def _told(trace: Trace) -> dict[str, Any]:
     return {
         "evaluations": trace.evaluations,
         "spent_seconds": trace.spent_seconds,
+        "spent_frames": trace.spent_frames,
         "seconds": trace.seconds,
         "frames": trace.frames,
         "losses": trace.losses,
@@ -216,40 +237,63 @@ def best_loss(scene: dict[str, Any]) -> float:
     return min(min(search["losses"]) for search in scene["searches"].values())
 
 
-def time_to(search: dict[str, Any], aim: float) -> tuple[float, bool]:
-    """Seconds until a loss of at most `aim`; those it was given, and False, where it never got there."""
-    for seconds, loss in zip(search["seconds"], search["losses"], strict=True):
+@dataclass(frozen=True)
+class Spent:
+    """Until a loss was reached; all that a search was given, where `there` is False."""
+
+    seconds: float
+    frames: int
+    there: bool
+
+
+def spent_to(search: dict[str, Any], aim: float) -> Spent:
+    """What a search spent until a loss of at most `aim`."""
+    for seconds, frames, loss in zip(search["seconds"], search["frames"], search["losses"], strict=True):
         if loss <= aim:
-            return seconds, True
-    return max(search["spent_seconds"], search["seconds"][-1]), False
+            return Spent(seconds, frames, True)
+    seconds = max(search["spent_seconds"], search["seconds"][-1])
+    return Spent(seconds, max(search["spent_frames"], search["frames"][-1]), False)
+
+
+def spent_in(scene: dict[str, Any]) -> dict[str, Spent]:
+    """By search: what it spent to come within 1 % of the best loss."""
+    aim = best_loss(scene) + WITHIN * abs(best_loss(scene))
+    return {name: spent_to(search, aim) for name, search in scene["searches"].items()}
 
 
 def rows_of(measured: list[dict[str, Any]]) -> list[Row]:
     """The rows of `vpltune bench tuning` from what was measured scene by scene."""
-    aims = [best_loss(scene) + WITHIN * abs(best_loss(scene)) for scene in measured]
-    ours = [time_to(scene["searches"]["ours"], aim) for scene, aim in zip(measured, aims, strict=True)]
-    made = sum(there for _, there in ours)
-    result = []
-    for name in [f"{search}{form}" for form in ("", "_surrogate") for search in SEARCHES]:
-        times = [time_to(scene["searches"][name], aim) for scene, aim in zip(measured, aims, strict=True)]
-        ratios = [theirs / mine for (theirs, _), (mine, _) in zip(times, ours, strict=True)]
-        seconds = [mine for mine, _ in ours]
-        # Its median ratio, in seconds of our own median, so that the row's ratio is the median over scenes.
-        missed = sum(not there for _, there in times)
+    spent = [spent_in(scene) for scene in measured]
+    ours = [scene["ours"] for scene in spent]
+    made = sum(mine.there for mine in ours)
+
+    def row(name: str, theirs: list[Spent], quantity: str, unit: str) -> Row:
+        own = median(getattr(mine, quantity) for mine in ours)
+        pairs = zip(theirs, ours, strict=True)
+        ratio = median(getattr(their, quantity) / getattr(mine, quantity) for their, mine in pairs)
+        missed = sum(not their.there for their in theirs)
         against = f"ours ({made} of {len(ours)} within 1 %)"
         if missed:
-            against += f"; ≥: {missed} of {len(times)} never got there"
-        result.append(Row(name, median(ratios) * median(seconds), "s", against, median(seconds)))
+            against += f"; ≥: {missed} of {len(theirs)} never got there"
+        # Its median ratio, in our own median, so that the row's ratio is the median over scenes.
+        return Row(name, ratio * own, unit, against, own)
+
+    best = [
+        min((scene[search] for search in SEARCHES), key=lambda found: (not found.there, found.seconds))
+        for scene in spent
+    ]
+    result = [row("best_search", best, "seconds", "s"), row("best_search_frames", best, "frames", "frames")]
+    for name in [f"{search}{form}" for form in ("", "_surrogate") for search in SEARCHES]:
+        result.append(row(name, [scene[name] for scene in spent], "seconds", "s"))
     for name in ("default", "bgfx_formula", "babylon_formula"):
         over = median(scene["losses"][name] / best_loss(scene) for scene in measured)
         result.append(Row(f"loss_{name}", over, "1", "best loss found by anyone", 1.0))
-    result.append(
-        Row(
-            "loss_ours",
-            median(min(scene["searches"]["ours"]["losses"]) / best_loss(scene) for scene in measured),
-            "1",
-            "best loss found by anyone",
-            1.0,
-        )
-    )
+    for name in ("ours", *SEARCHES):
+        over = median(min(scene["searches"][name]["losses"]) / best_loss(scene) for scene in measured)
+        result.append(Row(f"loss_{name}", over, "1", "best loss found by anyone", 1.0))
     return result
+
+
+if __name__ == "__main__":
+    for each in sys.argv[1:]:
+        measure_scene(each, present_scenes()[each])

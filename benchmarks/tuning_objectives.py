@@ -101,7 +101,7 @@ class RuntimeLoss:
 
 
 class SurrogateLoss:
-    """The same of the surrogate, at points of `SURROGATE_SPACE`, for VPLs that stand where they were captured."""
+    """The same of the surrogate, at points of `SURROGATE_SPACE`, for VPLs as they stand in captured views."""
 
     def __init__(self, views: Sequence[CapturedView], rest: ArtistParameters):
         self._rest = FalloffParameters.of(rest)
@@ -135,25 +135,29 @@ def _target(view: CapturedView) -> Target:
 
 
 class CappedObjective:
-    """Counts, keeps the time, and ends a search at its cap."""
+    """Counts into a trace, keeps the time, and ends a search after so many more evaluations, or seconds since
+    `started`."""
 
     def __init__(
         self,
         loss: Callable[[Point], float],
+        trace: Trace,
         frames: Callable[[], int],
-        started: float,
-        evaluations: int,
+        evaluations: int | None = None,
+        *,
         seconds: float,
+        started: float | None = None,
     ):
-        self.trace = Trace()
-        self._loss, self._frames, self._started = loss, frames, started
-        self._evaluations, self._seconds = evaluations, seconds
+        self._loss, self._trace, self._frames = loss, trace, frames
+        self._last = None if evaluations is None else trace.evaluations + evaluations
+        self._started = time.perf_counter() if started is None else started
+        self._seconds = seconds
 
     def __call__(self, point: Point) -> float:
         point = np.clip(np.asarray(point, np.float64), 0.0, 1.0)
         loss = float(self._loss(point))
         elapsed = time.perf_counter() - self._started
-        self.trace.add(point, loss, elapsed, self._frames())
-        if self.trace.evaluations >= self._evaluations or elapsed >= self._seconds:
+        self._trace.add(point, loss, elapsed, self._frames())
+        if self._trace.evaluations == self._last or elapsed >= self._seconds:
             raise SearchIsOver
         return loss

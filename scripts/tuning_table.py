@@ -5,7 +5,7 @@ python scripts/tuning_table.py
 
 import json
 
-from benchmarks.tuning import FOLDER, WITHIN, best_loss, rows_of, time_to
+from benchmarks.tuning import FOLDER, best_loss, rows_of, spent_in
 
 
 def main() -> None:
@@ -13,18 +13,18 @@ def main() -> None:
     scenes = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(FOLDER.glob("*.json"))]
     if not scenes:
         raise SystemExit(f"{FOLDER}: nothing measured yet; run `vpltune bench tuning` first")
-    print("| scene | search | loss over best | seconds to 1 % | times ours | frames | evaluations |")
+    print("| scene | search | loss over best | seconds to 1 % | times ours | frames to 1 % | times ours |")
     print("|---|---|---|---|---|---|---|")
     for scene in scenes:
-        best = best_loss(scene)
-        aim = best + WITHIN * abs(best)
-        ours, _ = time_to(scene["searches"]["ours"], aim)
+        best, spent = best_loss(scene), spent_in(scene)
+        ours = spent["ours"]
         for name, search in scene["searches"].items():
-            seconds, there = time_to(search, aim)
-            bound = "" if there else "≥ "
+            bound = "" if spent[name].there else "≥ "
+            seconds, frames = spent[name].seconds, spent[name].frames
             print(
-                f"| {scene['scene']} | {name} | {min(search['losses']) / best:.4f} | {bound}{seconds:.3g} |"
-                f" {bound}{seconds / ours:.3g} | {search['frames'][-1]} | {search['evaluations']} |"
+                f"| {scene['scene']} | {name} | {min(search['losses']) / best:.4f} |"
+                f" {bound}{seconds:.3g} | {bound}{seconds / ours.seconds:.3g} |"
+                f" {bound}{frames} | {bound}{frames / ours.frames:.3g} |"
             )
         for name, loss in scene["losses"].items():
             print(f"| {scene['scene']} | {name} | {loss / best:.4g} | | | | |")

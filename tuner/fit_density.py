@@ -44,9 +44,10 @@ RELAXATION = 4
 after 1, and 0.97 of that after 8."""
 _IMPORTANCES = (0.0, 0.5, 1.0)
 """Of η, at γ = 1; more where their parabola is least, in steps of a tenth."""
-_EXPONENT_TRIED = 0.5
+_EXPONENTS = (0.75, 0.5, 0.25, 0.0)
+"""Of γ, at the best η, for as long as the loss falls."""
 _TRIALS = 6
-"""At most: the start's own, three of η, one at their parabola's minimum, one of γ."""
+"""As a rule: the start's own, three of η, one at their parabola's minimum, one of γ."""
 
 Rotation = tuple[float, float]
 Density = tuple[float, float, int]
@@ -141,7 +142,7 @@ def fit_density(
         if best() == density:
             best_captured = captured
         if progress is not None:
-            progress(len(fits) / (_TRIALS + 1))
+            progress(min(len(fits) / (_TRIALS + 1), 1.0))
 
     # The start itself is a candidate: the result is never worse than a fit of the falloff alone.
     first = (start.density_exponent, start.density_importance, start.density_relaxation)
@@ -155,7 +156,10 @@ def fit_density(
     row.append((1.0, round(importance, 1), RELAXATION))
     measure(row[-1])
     lowest = min(row, key=lambda density: fits[density][1].loss)
-    measure((_EXPONENT_TRIED, *lowest[1:]))
+    for exponent in _EXPONENTS:
+        measure((exponent, *lowest[1:]))
+        if best() != (exponent, *lowest[1:]):
+            break
     parameters, descent = fits[best()]
     if runtime.visibility == "maps":
         seen = visibility_at_falloff(best_captured, parameters, seed=seed)

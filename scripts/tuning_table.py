@@ -13,8 +13,11 @@ def main() -> None:
     scenes = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(FOLDER.glob("*.json"))]
     if not scenes:
         raise SystemExit(f"{FOLDER}: nothing measured yet; run `vpltune bench tuning` first")
-    print("| scene | search | loss over best | seconds to 1 % | times ours | frames to 1 % | times ours |")
-    print("|---|---|---|---|---|---|---|")
+    print(
+        "| scene | search | loss over best | held-out loss over ours |"
+        " seconds to 1 % | times ours | frames to 1 % | times ours |"
+    )
+    print("|---|---|---|---|---|---|---|---|")
     for scene in scenes:
         best, spent = best_loss(scene), spent_in(scene)
         ours = spent["ours"]
@@ -23,11 +26,12 @@ def main() -> None:
             seconds, frames = spent[name].seconds, spent[name].frames
             print(
                 f"| {scene['scene']} | {name} | {min(search['losses']) / best:.4f} |"
+                f" {search['held_out'] / scene['searches']['ours']['held_out']:.4f} |"
                 f" {bound}{seconds:.3g} | {bound}{seconds / ours.seconds:.3g} |"
                 f" {bound}{frames} | {bound}{frames / ours.frames:.3g} |"
             )
         for name, loss in scene["losses"].items():
-            print(f"| {scene['scene']} | {name} | {loss / best:.4g} | | | | |")
+            print(f"| {scene['scene']} | {name} | {loss / best:.4g} | | | | | |")
     print()
     for row in rows_of(scenes):
         print(f"{row.name}: {row.ratio:.3g} ({row.against})")

@@ -7,9 +7,10 @@ and at few VPLs the best α, k and κ are others than at many.
 
 For each candidate (γ, η) the falloff is fitted anew, which takes microseconds a step. Over (γ, η) itself the
 loss is measured in the runtime, along one axis after the other: as density shifts, VPLs cross edges and
-corners, and in a Cornell box one step of 0.05 in seven goes against the smooth trend (`vpltune bench density`,
-row `density_slope_agreement`). In four rooms this ends where a grid of nine and the minimum of a quadratic
-through it did, in half the time, but in one with a loss 3 % higher (relMSE of held-out rotations: 2 %).
+corners, and in a Cornell box one step of 0.05 in seven goes against the smooth trend (row
+`density_slope_agreement` of `vpltune bench density`). In four rooms this ends where a grid of nine and the
+minimum of a quadratic through it did, in half the time, but in one with a loss 3 % higher (relMSE of held-out
+rotations: 2 %).
 
 Every candidate but the start's own has cells (`density_relaxation`): at few VPLs most of the error is that a
 point shines for all that lies around it, not where shadows fall. With visibility maps their bias and softness

@@ -100,7 +100,7 @@ def fit_visibility(
 def visibility_at_falloff(
     views: tuple[CapturedView, ...], start: ArtistParameters, *, seed: int = 0
 ) -> ArtistParameters:
-    """`start` with the bias and softness that are best at its own falloff: half a turn of `fit_visibility`."""
+    """`start` with the bias and softness that are best at its own falloff."""
     chosen = [_view_of(view, seed + index) for index, view in enumerate(views)]
     return fit_visibility_to(tuple(_reduced(view, start) for view in chosen), start)[0]
 

@@ -55,7 +55,8 @@ def reduce_columns(
     # Of a semidefinite matrix (Higham 1990), and twenty times sooner than its eigenvectors. It ends where
     # what is left is no more than rounding.
     upper, pivots, rank, _ = dpstrf(gram, tol=ROUNDING * np.diagonal(gram).max())
-    factor = np.zeros_like(gram)
+    # Not a number: it must not pass for darkness.
+    factor = np.full_like(gram, 0.0 if np.isfinite(gram).all() else np.nan)
     factor[:rank, pivots - 1] = np.triu(upper)[:rank]
     return jnp.asarray(factor[:, :-1], jnp.float32), jnp.asarray(factor[:, -1], jnp.float32), offset
 

@@ -1,5 +1,7 @@
 """The small least-squares problem of a view has the loss of all its receivers."""
 
+from dataclasses import replace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -59,3 +61,10 @@ def test_a_black_view_is_all_zero(view):
     assert not np.any(reduced.factor)
     assert not np.any(reduced.target)
     assert float(reduced.offset) == 0.0
+
+
+def test_what_is_not_finite_stays_so(view):
+    """It must not be taken for a view without light."""
+    binned, halves = view
+    broken = replace(binned, irradiance=binned.irradiance.at[7, 0, 3].set(jnp.nan))
+    assert np.isnan(reduce_gather(broken, target_of(*halves)).factor).any()

@@ -75,12 +75,13 @@ class RuntimeLoss:
         views: Sequence[CapturedView],
         rotations: Sequence[Rotation],
         base: ArtistParameters,
+        even_share: float = EVEN_SHARE,
     ):
         self._runtime, self._views, self._rotations, self._base = runtime, views, rotations, base
         # As numpy arrays: what they cost to compare is not to be JAX's start of a computation.
         self._targets = [
             tuple(np.asarray(part) for part in (target.half_a, target.half_b, target.weight))
-            for target in map(_target, views)
+            for target in (_target(view, even_share) for view in views)
         ]
 
     def __call__(self, point: Point) -> float:
@@ -129,9 +130,9 @@ def _surrogate_loss(point: jax.Array, pairs: tuple, rest: FalloffParameters) -> 
     return jnp.mean(jnp.stack(losses))
 
 
-def _target(view: CapturedView) -> Target:
+def _target(view: CapturedView, even_share: float = EVEN_SHARE) -> Target:
     halves = (half[view.valid] for half in (view.reference.irradiance_a, view.reference.irradiance_b))
-    return target_of(*halves, EVEN_SHARE)
+    return target_of(*halves, even_share)
 
 
 class CappedObjective:

@@ -14,7 +14,7 @@ def main() -> None:
     if not scenes:
         raise SystemExit(f"{FOLDER}: nothing measured yet; run `vpltune bench tuning` first")
     print(
-        "| scene | search | loss over best | held-out loss over ours |"
+        "| scene | search | loss over best | held-out relMSE over ours |"
         " seconds to 1 % | times ours | frames to 1 % | times ours |"
     )
     print("|---|---|---|---|---|---|---|---|")
@@ -26,7 +26,7 @@ def main() -> None:
             seconds, frames = spent[name].seconds, spent[name].frames
             print(
                 f"| {scene['scene']} | {name} | {min(search['losses']) / best:.4f} |"
-                f" {search['held_out'] / scene['searches']['ours']['held_out']:.4f} |"
+                f" {search['held_out_relmse'] / scene['searches']['ours']['held_out_relmse']:.4f} |"
                 f" {bound}{seconds:.3g} | {bound}{seconds / ours.seconds:.3g} |"
                 f" {bound}{frames} | {bound}{frames / ours.frames:.3g} |"
             )

@@ -121,8 +121,11 @@ class FrameBudget:
         self._runtimes: dict[FrameChoice, Runtime] = {}
 
     def least_milliseconds(self) -> float:
-        """Of the cheapest frame that has any VPLs to speak of."""
-        return min(self.costs.milliseconds(choice, LEAST_COUNT) for choice in self._choices(0.0))
+        """The least budget: of the cheapest frame in which every pixel has any VPLs to speak of."""
+        return min(
+            self.costs.milliseconds(choice, LEAST_COUNT * choice.interleave**2) / AIM
+            for choice in self._choices(0.0)
+        )
 
     def fit(self, budget: float, progress: Progress | None = None) -> BudgetFit:
         """The best found within `budget` milliseconds.

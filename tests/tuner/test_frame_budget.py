@@ -49,7 +49,7 @@ def steady_clock(monkeypatch, tmp_path):
     monkeypatch.setattr(Runtime, "frame_milliseconds", frame)
     monkeypatch.setattr(frame_budget, "HELD_OUT_ROTATIONS", 2)
     monkeypatch.setattr("tuner.fit_density.ROTATIONS", 2)
-    monkeypatch.setattr("tuner.fit_density._GRID", (1.0,))
+    monkeypatch.setattr("tuner.fit_density._EXPONENTS", ())
     monkeypatch.setenv("VPLTUNE_CACHE", str(tmp_path / "cache"))
 
 

@@ -15,13 +15,13 @@ from jaxtyping import Float64, Int64
 
 from benchmarks.row import Row
 from benchmarks.scene_library import present_scenes
+from benchmarks.visibility_quality import ray_visibility
 from renderer.artist_parameters import ArtistParameters
 from renderer.scene import Scene, transform_points
 from renderer.tuned_config import TunedConfig
 from tuner.captured_view import CapturedView, runtime_irradiance
 from tuner.evaluate import surrogate_irradiance
 from tuner.prepare_scene import PreparedScene, SceneOptions, Stopwatch, prepare_scene
-from tuner.reference import ray_traced_visibility
 from tuner.view_metrics import relmse
 from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_visibility import (
@@ -91,7 +91,7 @@ def _scene_rows(name: str, prepared: PreparedScene) -> list[Row]:
         by_depth.append([_error(view, seen) for seen in _seen_by_depth(view, texels)])
         drawn = runtime_irradiance(prepared.runtime, DEFAULT, view)
         cast.append(relmse(drawn[view.valid], view.reference.irradiance[view.valid]))
-        traced.append(_error(view, _rays(prepared, view)))
+        traced.append(_error(view, ray_visibility(prepared, view)))
     ours = float(np.mean(cast))
     return [
         Row(f"{name}_splatted", float(np.mean(by_plane)), "1", "cast maps", ours),
@@ -205,17 +205,6 @@ def _seen_by_depth(view: CapturedView, texels: MapTexels) -> list[np.ndarray]:
         for number, bias in enumerate(BIASES):
             seen[number, :, index] = distance * (1.0 - bias) <= depth[index, row, column]
     return list(seen)
-
-
-def _rays(prepared: PreparedScene, view: CapturedView) -> np.ndarray:
-    captured = view.captured
-    return ray_traced_visibility(
-        prepared.scene,
-        captured.position_world[captured.valid].astype(np.float64),
-        captured.normal_world[captured.valid],
-        captured.vpl_position_world.astype(np.float64),
-        captured.vpl_normal_world,
-    )
 
 
 def _error(view: CapturedView, visibility: np.ndarray) -> float:

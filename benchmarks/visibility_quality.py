@@ -63,7 +63,7 @@ def scene_figures(path: Path) -> Figures:
             )
             for state, parameters in zip(STATES, (DEFAULT, tuned), strict=True)
         }
-    seen = {view.view.name: _rays(prepared, view) for view in prepared.views}
+    seen = {view.view.name: ray_visibility(prepared, view) for view in prepared.views}
     fitted = _of_fitted(prepared.views)
     tuned, _ = fit_falloff(fitted, DEFAULT, visibility=tuple(seen[view.view.name] for view in fitted))
     figures[CEILING] = {
@@ -110,7 +110,8 @@ def _tuned(views: tuple[CapturedView, ...], mode: Visibility) -> ArtistParameter
     return fit_falloff(views, start)[0]
 
 
-def _rays(prepared: PreparedScene, view: CapturedView) -> np.ndarray:
+def ray_visibility(prepared: PreparedScene, view: CapturedView) -> np.ndarray:
+    """What rays from every receiver to every VPL of a view tell, [receivers, vpls] in {0, 1}."""
     captured = view.captured
     return ray_traced_visibility(
         prepared.scene,

@@ -14,7 +14,7 @@ from renderer.frame import Frame
 from renderer.runtime import Runtime
 from tuner.captured_view import CapturedView
 from tuner.fit_density import Rotation
-from tuner.losses.relative_squared_error import EVEN_SHARE, Target, target_of, weighted_squared_error
+from tuner.losses.relative_squared_error import Target, target_of, weighted_squared_error
 from tuner.search_space import FALLOFF_SPECS, VISIBILITY_SPECS, SearchSpace
 from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_gather import FalloffParameters, gather
@@ -66,8 +66,8 @@ class CountingRuntime(Runtime):
 
 
 class RuntimeLoss:
-    """The fit's own loss of what the runtime draws: every view drawn at every rotation of the point table,
-    read back and compared, each time."""
+    """relMSE, free of the reference's noise, of what the runtime draws: every view drawn at every rotation of
+    the point table, read back and compared, each time."""
 
     def __init__(
         self,
@@ -75,13 +75,12 @@ class RuntimeLoss:
         views: Sequence[CapturedView],
         rotations: Sequence[Rotation],
         base: ArtistParameters,
-        even_share: float = EVEN_SHARE,
     ):
         self._runtime, self._views, self._rotations, self._base = runtime, views, rotations, base
         # As numpy arrays: what they cost to compare is not to be JAX's start of a computation.
         self._targets = [
             tuple(np.asarray(part) for part in (target.half_a, target.half_b, target.weight))
-            for target in (_target(view, even_share) for view in views)
+            for target in (_target(view) for view in views)
         ]
 
     def __call__(self, point: Point) -> float:
@@ -130,9 +129,9 @@ def _surrogate_loss(point: jax.Array, pairs: tuple, rest: FalloffParameters) -> 
     return jnp.mean(jnp.stack(losses))
 
 
-def _target(view: CapturedView, even_share: float = EVEN_SHARE) -> Target:
+def _target(view: CapturedView) -> Target:
     halves = (half[view.valid] for half in (view.reference.irradiance_a, view.reference.irradiance_b))
-    return target_of(*halves, even_share)
+    return target_of(*halves, even_share=0.0)
 
 
 class CappedObjective:

@@ -5,16 +5,17 @@ the mean of the loss over several rotations of the point table (Cranley and Patt
 every candidate (common random numbers): it holds the bias of the falloff and the variance of the placement,
 and at few VPLs the best α, k and κ are others than at many.
 
-For each candidate (γ, η) the falloff is fitted anew, which takes microseconds a step. Over (γ, η) itself the
-loss is measured in the runtime, along one axis after the other: as density shifts, VPLs cross edges and
-corners, and in a Cornell box one step of 0.05 in seven goes against the smooth trend (row
-`density_slope_agreement` of `vpltune bench density`). In four rooms this ends where a grid of nine and the
-minimum of a quadratic through it did, in half the time, but in one with a loss 3 % higher (relMSE of held-out
-rotations: 2 %).
+Over (γ, η) the loss is measured in the runtime, along one axis after the other, each candidate's picture at
+its best k: as density shifts, VPLs cross edges and corners, and in a Cornell box one step of 0.05 in seven
+goes against the smooth trend (row `density_slope_agreement` of `vpltune bench density`). In four rooms this
+ends where a grid of nine and the minimum of a quadratic through it did, in half the time, but in one with a
+loss 3 % higher (relMSE of held-out rotations: 2 %).
+
+Falloff and maps are fitted once, at the best density. Fitted at every candidate, they chose the same one in
+eight of nine scenes, for twice the time, and in the ninth one with 2 % less loss.
 
 Every candidate but the start's own has cells (`density_relaxation`): at few VPLs most of the error is that a
-point shines for all that lies around it, not where shadows fall. With visibility maps their bias and softness
-are fitted last, at the best density, and the falloff once more with them.
+point shines for all that lies around it, not where shadows fall.
 """
 
 import math
@@ -30,8 +31,8 @@ from renderer.runtime import Runtime
 from tuner.captured_view import CapturedView
 from tuner.fit_falloff import fit_falloff
 from tuner.fit_status import Descent
-from tuner.fit_visibility import visibility_at_falloff
-from tuner.losses.relative_squared_error import DARK_SHARE
+from tuner.fit_visibility import fit_falloff_and_visibility
+from tuner.losses.relative_squared_error import DARK_SHARE, EVEN_SHARE, target_of
 from tuner.search_space import held_for
 
 ROTATIONS = 8
@@ -57,7 +58,7 @@ Density = tuple[float, float, int]
 
 @dataclass(frozen=True)
 class DensityTrial:
-    """One candidate: its densities, and the loss that was left after fitting the falloff."""
+    """One candidate: its densities, and the loss of what the runtime draws with it, at the best k."""
 
     density_exponent: float
     density_importance: float
@@ -114,6 +115,7 @@ def fit_density(
     *,
     seed: int = 0,
     rotations: Sequence[Rotation] | None = None,
+    even_share: float = EVEN_SHARE,
     progress: Callable[[float], None] | None = None,
 ) -> DensityFit:
     """Density and falloff for `start.vpl_count` VPLs, robust over rotations of the point table.
@@ -124,49 +126,71 @@ def fit_density(
         start: the count, where the falloff's fit begins, and what is not fitted.
         seed: of rotations and pixels.
         rotations: what to fit to; None takes `ROTATIONS` of them.
+        even_share: weight of plain squared error beside relMSE, see `tuner.losses`.
         progress: called with the share done, in [0, 1].
     """
     chosen = table_rotations(ROTATIONS, seed) if rotations is None else tuple(rotations)
-    fits: dict[Density, tuple[ArtistParameters, Descent]] = {}
-    held = held_for(runtime.visibility)
-    best_captured: tuple[CapturedView, ...] = ()
+    losses: dict[Density, float] = {}
+    captured: tuple[CapturedView, ...] = ()
 
     def best() -> Density:
-        return min(fits, key=lambda density: fits[density][1].loss)
+        return min(losses, key=lambda density: losses[density])
 
-    def measure(density: Density) -> None:
-        nonlocal best_captured
-        if density in fits:
-            return
-        captured = rotated_views(runtime, views, _with(start, density), chosen)
-        fits[density] = fit_falloff(captured, _with(start, density), seed=seed, held=held)
-        if best() == density:
-            best_captured = captured
-        if progress is not None:
-            progress(min(len(fits) / (_TRIALS + 1), 1.0))
+    def measure(density: Density) -> float:
+        nonlocal captured
+        if density not in losses:
+            drawn = rotated_views(runtime, views, _with(start, density), chosen)
+            losses[density] = drawn_loss(drawn, even_share)
+            captured = drawn if best() == density else captured
+            if progress is not None:
+                progress(min(len(losses) / (_TRIALS + 1), 1.0))
+        return losses[density]
 
-    # The start itself is a candidate: the result is never worse than a fit of the falloff alone.
+    def fitted(density: Density) -> DensityFit:
+        parameters, held = _with(start, density), held_for(runtime.visibility)
+        if runtime.visibility == "maps":
+            result = fit_falloff_and_visibility(captured, parameters, seed=seed, even_share=even_share)
+        else:
+            result = fit_falloff(captured, parameters, seed=seed, held=held, even_share=even_share)
+        return DensityFit(*result, tuple(DensityTrial(*tried, loss) for tried, loss in losses.items()))
+
+    # The start itself is a candidate: the result is never worse than it.
     first = (start.density_exponent, start.density_importance, start.density_relaxation)
-    row = [(1.0, importance, RELAXATION) for importance in _IMPORTANCES]
-    for density in (first, *row):
-        measure(density)
-        if fits[density][1].status.nothing_fitted:
-            # Nothing lit, or not finite: no density will mend it.
-            return DensityFit(start, fits[density][1], _trials(fits))
-    importance = parabola_minimum(_IMPORTANCES, [fits[density][1].loss for density in row])
-    row.append((1.0, round(importance, 1), RELAXATION))
-    measure(row[-1])
-    lowest = min(row, key=lambda density: fits[density][1].loss)
+    if not math.isfinite(measure(first)):
+        # Nothing lit, or not finite: no density will mend it, and the fit says which.
+        return fitted(first)
+    row = [measure((1.0, importance, RELAXATION)) for importance in _IMPORTANCES]
+    importance = round(parabola_minimum(_IMPORTANCES, row), 1)
+    measure((1.0, importance, RELAXATION))
+    importance = min((*_IMPORTANCES, importance), key=lambda place: losses[1.0, place, RELAXATION])
     for exponent in _EXPONENTS:
-        measure((exponent, *lowest[1:]))
-        if best() != (exponent, *lowest[1:]):
+        measure((exponent, importance, RELAXATION))
+        if best() != (exponent, importance, RELAXATION):
             break
-    parameters, descent = fits[best()]
-    if runtime.visibility == "maps":
-        seen = visibility_at_falloff(best_captured, parameters, seed=seed)
-        refitted = fit_falloff(best_captured, seen, seed=seed, held=held)
-        parameters, descent = min((parameters, descent), refitted, key=lambda fit: fit[1].loss)
-    return DensityFit(parameters, descent, _trials(fits))
+    return fitted(best())
+
+
+def drawn_loss(drawn: Sequence[CapturedView], even_share: float) -> float:
+    """The loss of pictures as they were drawn, but for k, which is at its best; not a number where no view is
+    lit."""
+    terms = []
+    for view in drawn:
+        picture = view.captured.indirect_irradiance[view.valid].astype(np.float64)
+        halves = (half[view.valid] for half in (view.reference.irradiance_a, view.reference.irradiance_b))
+        target = target_of(*halves, even_share)
+        half_a, half_b, weight = (
+            np.asarray(x, np.float64) for x in (target.half_a, target.half_b, target.weight)
+        )
+        terms.append(
+            (
+                (weight * picture**2).sum(),
+                (weight * picture * (half_a + half_b)).sum(),
+                (weight * half_a * half_b).sum(),
+            )
+        )
+    square, product, constant = np.mean(terms, axis=0)
+    # Of square · k² - product · k + constant.
+    return float(constant - product**2 / (4.0 * square)) if square > 0.0 else math.nan
 
 
 def parabola_minimum(places: Sequence[float], losses: Sequence[float]) -> float:
@@ -210,10 +234,6 @@ def _with(parameters: ArtistParameters, density: Density) -> ArtistParameters:
         density_importance=importance,
         density_relaxation=relaxation,
     )
-
-
-def _trials(fits: dict[Density, tuple[ArtistParameters, Descent]]) -> tuple[DensityTrial, ...]:
-    return tuple(DensityTrial(*density, descent.loss) for density, (_, descent) in fits.items())
 
 
 def _relmse(view: CapturedView) -> float:

@@ -22,8 +22,8 @@ from tuner.captured_view import CapturedView
 from tuner.descent import descend
 from tuner.fit_falloff import fit_to
 from tuner.fit_status import Descent
-from tuner.fit_views import RECEIVERS_PER_VIEW, fit_view
-from tuner.losses.relative_squared_error import target_of
+from tuner.fit_views import RECEIVERS_PER_VIEW, FitView, fit_view
+from tuner.losses.relative_squared_error import EVEN_SHARE, target_of
 from tuner.reduced_gather import reduce_columns
 from tuner.search_space import VISIBILITY_SPECS, SearchSpace
 from tuner.virtual_point_lights import Receivers, VirtualPointLights, gather_inputs
@@ -75,34 +75,40 @@ def fit_visibility(
     Returns:
         The parameters, and the last turn's descent; None where nothing is lit.
     """
-    chosen = [_view_of(view, seed + index) for index, view in enumerate(views)]
+    chosen = _views_of(views, seed)
     current, descent = start, None
     for _ in range(TURNS):
-        ready = tuple(
-            fit_view(
-                view.receivers,
-                view.vpls,
-                seen_share(view.overlap, VisibilityParameters.of(current)),
-                *view.halves,
-                view.pixels,
-                view.size,
-            )
-            for view in chosen
-        )
-        current, falloff = fit_to(ready, current)
+        current, falloff = fit_to(_ready(chosen, current), current)
         if falloff.status.nothing_fitted:
             return start, None
-        current, descent = fit_visibility_to(tuple(_reduced(view, current) for view in chosen), current)
+        current, descent = fit_visibility_to(_reduced(chosen, current), current)
     found = {spec.name: getattr(current, spec.name) for spec in VISIBILITY_SPECS}
     return replace(start, **found), descent
 
 
-def visibility_at_falloff(
-    views: tuple[CapturedView, ...], start: ArtistParameters, *, seed: int = 0
-) -> ArtistParameters:
-    """`start` with the bias and softness that are best at its own falloff."""
-    chosen = [_view_of(view, seed + index) for index, view in enumerate(views)]
-    return fit_visibility_to(tuple(_reduced(view, start) for view in chosen), start)[0]
+def fit_falloff_and_visibility(
+    views: tuple[CapturedView, ...],
+    start: ArtistParameters,
+    *,
+    seed: int = 0,
+    even_share: float = EVEN_SHARE,
+) -> tuple[ArtistParameters, Descent]:
+    """The falloff, bias and softness at it, and the falloff once more: all in one turn.
+
+    Args:
+        views: what to fit to, captured with visibility maps.
+        start: where to begin, and what the other parameters stay at.
+        seed: of the choice of pixels.
+        even_share: of the falloff's loss, see `tuner.losses`.
+    """
+    chosen = _views_of(views, seed)
+    parameters, descent = fit_to(_ready(chosen, start, even_share), start)
+    if descent.status.nothing_fitted:
+        return start, descent
+    seen, _ = fit_visibility_to(_reduced(chosen, parameters), parameters)
+    refitted = fit_to(_ready(chosen, seen, even_share), seen)
+    # Maps are fitted to relMSE alone, and may be worse by the other share.
+    return min((parameters, descent), refitted, key=lambda fit: fit[1].loss)
 
 
 def fit_visibility_to(
@@ -170,9 +176,33 @@ def _view_of(view: CapturedView, seed: int) -> _View:
     return _View(receivers, vpls, overlap, (half_a, half_b), pixels, view.view.size)
 
 
-def _reduced(view: _View, parameters: ArtistParameters) -> ReducedVisibility:
+def _views_of(views: tuple[CapturedView, ...], seed: int) -> list[_View]:
+    return [_view_of(view, seed + index) for index, view in enumerate(views)]
+
+
+def _ready(
+    views: list[_View], parameters: ArtistParameters, even_share: float = EVEN_SHARE
+) -> tuple[FitView, ...]:
+    visibility = VisibilityParameters.of(parameters)
+    return tuple(
+        fit_view(
+            view.receivers,
+            view.vpls,
+            seen_share(view.overlap, visibility),
+            *view.halves,
+            view.pixels,
+            view.size,
+            even_share,
+        )
+        for view in views
+    )
+
+
+def _reduced(views: list[_View], parameters: ArtistParameters) -> tuple[ReducedVisibility, ...]:
     falloff = FalloffParameters.of(parameters)
-    return reduce_visibility(view.receivers, view.vpls, view.overlap, view.halves, falloff)
+    return tuple(
+        reduce_visibility(view.receivers, view.vpls, view.overlap, view.halves, falloff) for view in views
+    )
 
 
 @jax.jit

@@ -1,5 +1,7 @@
 """Density and falloff fitted to the error of few VPLs, on rotations of the point table."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from built_scenes import colored_room
@@ -9,8 +11,11 @@ from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
 from tuner.captured_view import CapturedView
 from tuner.fit_density import (
+    _relmse,
+    drawn_loss,
     fit_density,
     parabola_minimum,
+    rotated_views,
     rotation_errors,
     table_rotations,
 )
@@ -39,19 +44,39 @@ def test_few_vpls_are_better_where_they_were_not_fitted_to(room):
     assert tuned < 0.33 * error(FEW)
     assert tuned < 0.4 * error(ArtistParameters(vpl_count=48, density_exponent=0.0))
     assert fit.parameters.vpl_count == FEW.vpl_count
-    # The maps are fitted after the trials.
+    # Falloff and maps are fitted after the trials.
     assert fit.descent.loss <= min(trial.loss for trial in fit.trials)
 
 
 @pytest.mark.slow
-def test_the_result_is_never_worse_than_the_falloff_alone(room):
-    """The start's own density is among the trials, whatever it is."""
+def test_the_result_is_never_worse_than_the_start(room):
+    """The start's own density is among the trials, whatever it is, and their losses are those of pictures."""
     runtime, view = room
     start = ArtistParameters(vpl_count=16, density_exponent=0.8, density_importance=0.3)
     fit = fit_density(runtime, (view,), start, rotations=table_rotations(2, 0))
     own = [t for t in fit.trials if (t.density_exponent, t.density_importance) == (0.8, 0.3)]
     assert len(own) == 1
     assert fit.descent.loss <= own[0].loss
+
+
+def test_a_pictures_loss_is_that_of_its_best_intensity(room):
+    """A picture at half its strength has the same loss; at its best k it is the loss of that very picture."""
+    runtime, view = room
+    (drawn,) = rotated_views(runtime, (view,), FEW, ((0.0, 0.0),))
+    loss = drawn_loss((drawn,), even_share=0.0)
+
+    def scaled(factor: float) -> CapturedView:
+        picture = factor * drawn.captured.indirect_irradiance
+        return replace(drawn, captured=replace(drawn.captured, indirect_irradiance=picture))
+
+    # float32 pictures: a part in 10⁷ each, averaged over pixels.
+    assert drawn_loss((scaled(0.5),), even_share=0.0) == pytest.approx(loss, rel=1e-5)
+    factors = np.linspace(0.5, 1.5, 201)
+    losses = [_relmse(scaled(float(np.float32(factor)))) for factor in factors]
+    # The parabola's bottom is at most half a step away, where it has risen by (step/2)² of its curvature.
+    curvature = (losses[0] - 2.0 * losses[100] + losses[-1]) / (2.0 * 0.5**2)
+    assert 0.0 <= min(losses) - loss <= curvature * 0.0025**2 * 1.01 + 1e-7
+    assert np.isnan(drawn_loss((scaled(0.0),), even_share=0.0))
 
 
 def test_nothing_lit_is_a_status(gl_context):

@@ -8,7 +8,7 @@ is measured along its own axis, at two VPL counts, and any combination is put to
 import hashlib
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 import moderngl
@@ -87,6 +87,16 @@ class CostModel:
             combined[name] = cost
         return combined
 
+    def scaled(self, factor: float) -> "CostModel":
+        """Of a machine on which everything takes `factor` times as long."""
+        axes = {axis.name: getattr(self, axis.name) for axis in fields(self)}
+        return CostModel(
+            **{
+                name: {value: _times(costs, factor) for value, costs in axis.items()}
+                for name, axis in axes.items()
+            }
+        )
+
     def milliseconds(self, choice: FrameChoice, count: int) -> float:
         """Of a whole frame with `count` VPLs."""
         return sum(cost.fixed + cost.per_vpl * count for cost in self.costs(choice).values())
@@ -116,7 +126,8 @@ def measured_cost_model(
 
     `config` says how VPLs are occluded, and whether there is importance and a near field to pay for.
     """
-    path = _path(str(context.info["GL_RENDERER"]), scene, views, config)
+    key = costs_key(str(context.info["GL_RENDERER"]), scene, views, config)
+    path = cache_folder() / "costs" / f"{key}.json"
     kept = _read(path)
     if kept is not None:
         return kept
@@ -144,6 +155,20 @@ def measured_cost_model(
     return model
 
 
+def costs_key(renderer: str, scene: Scene, views: Sequence[View], config: TunedConfig) -> str:
+    """Hash of all that a frame's costs depend on."""
+    parts = [_FORMAT, renderer, scene_digest(scene), config.visibility]
+    parts += [config.parameters.density_importance > 0.0, config.parameters.screen_space_strength > 0.0]
+    parts += [config.parameters.density_relaxation]
+    for view in views:
+        parts += [view.size, view.camera.to_world.tolist(), view.camera.yfov]
+        parts += [
+            (light.kind, light.position_world.tolist(), light.direction_world.tolist(), light.outer_cone)
+            for light in view.lights
+        ]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
 def default_choice(view: View) -> FrameChoice:
     """What a runtime does unless told otherwise."""
     return FrameChoice(rsm_resolution=rsm_resolutions(view)[0])
@@ -153,6 +178,10 @@ def rsm_resolutions(view: View) -> tuple[int, ...]:
     """Of a face, the runtime's own first."""
     own = RSM_RESOLUTION if face_count(view.lights) <= FEW_FACES else RSM_RESOLUTION_OF_MANY
     return tuple(own // divisor for divisor in RSM_DIVISORS)
+
+
+def _times(costs: Costs, factor: float) -> Costs:
+    return {name: PassCost(factor * cost.fixed, factor * cost.per_vpl) for name, cost in costs.items()}
 
 
 def _scaled(cost: PassCost, other: PassCost, base: PassCost) -> PassCost:
@@ -174,20 +203,6 @@ def _measure(runtime: Runtime, views: Sequence[View], config: TunedConfig) -> Co
         # Noise may make a pass dearer with fewer VPLs: then all of it is fixed.
         costs[name] = PassCost(max(0.0, high[name] - slope * COUNTS[1]), slope)
     return costs
-
-
-def _path(renderer: str, scene: Scene, views: Sequence[View], config: TunedConfig) -> Path:
-    parts = [_FORMAT, renderer, scene_digest(scene), config.visibility]
-    parts += [config.parameters.density_importance > 0.0, config.parameters.screen_space_strength > 0.0]
-    parts += [config.parameters.density_relaxation]
-    for view in views:
-        parts += [view.size, view.camera.to_world.tolist(), view.camera.yfov]
-        parts += [
-            (light.kind, light.position_world.tolist(), light.direction_world.tolist(), light.outer_cone)
-            for light in view.lights
-        ]
-    digest = hashlib.sha256(json.dumps(parts).encode()).hexdigest()
-    return cache_folder() / "costs" / f"{digest}.json"
 
 
 def _write(path: Path, model: CostModel) -> None:

@@ -2,18 +2,21 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
 from renderer.artist_parameters import ArtistParameters
 from renderer.atomic_file import write_text_whole, written_whole
 from renderer.tuned_config import TunedConfig, write_config
+from tuner.cost_model import FrameChoice
 from tuner.fit_status import Descent
 from tuner.frame_budget import BudgetFit, FrameBudget
+from tuner.pareto_front import fit_front
 from tuner.prepare_scene import PreparedScene
 
 _COLUMNS = ("milliseconds", "relmse", "vpl_count")
+_CHOICES = tuple(choice.name for choice in fields(FrameChoice))
 
 
 @dataclass(frozen=True)
@@ -64,25 +67,33 @@ def fit_to_budget(
         found["budget"] = {"frame_size": list(size), **best.document()}
         begin = end
     if options.pareto:
-        points = budget.front(lambda share: progress(begin + (1.0 - begin) * share))
-        found["pareto"] = write_front(output, points, start)
+        points = fit_front(budget, lambda share: progress(begin + (1.0 - begin) * share))
+        found["pareto"] = write_front(output, points, start, size)
         best = best or points[-1]
     assert best is not None, "options ask for neither"
     return best.parameters, best.descent, found
 
 
-def write_front(output: Path, points: Sequence[BudgetFit], start: TunedConfig) -> list[dict[str, Any]]:
-    """Write pareto/<n>.json, pareto.csv and pareto.png into `output`; returns `pareto` of metrics.json."""
+def write_front(
+    output: Path, points: Sequence[BudgetFit], start: TunedConfig, frame_size: tuple[int, int]
+) -> list[dict[str, Any]]:
+    """Write pareto/<n>.json, pareto.csv and pareto.png into `output`; returns `pareto` of metrics.json.
+
+    Configs of an earlier front are removed: it may have had more points.
+    """
+    for earlier in output.glob("pareto/[0-9]*.json"):
+        earlier.unlink()
     rows = []
     for index, point in enumerate(points):
         name = f"pareto/{index}.json"
         provenance = {"milliseconds": point.frame.milliseconds, **asdict(point.frame.choice)}
         write_config(output / name, TunedConfig(point.parameters, provenance, start.visibility))
-        rows.append({**point.document(), "parameters": point.parameters.as_dict(), "config": name})
-    lines = [",".join((*_COLUMNS, "interleave", "config"))]
+        document = {"frame_size": list(frame_size), **point.document()}
+        rows.append({**document, "parameters": point.parameters.as_dict(), "config": name})
+    lines = [",".join((*_COLUMNS, *_CHOICES, "config"))]
     for row in rows:
-        cells = [f"{row[name]:.6g}" for name in _COLUMNS]
-        lines.append(",".join((*cells, str(row["choice"]["interleave"]), row["config"])))
+        cells = [f"{row[name]:.6g}" for name in _COLUMNS] + [str(row["choice"][name]) for name in _CHOICES]
+        lines.append(",".join((*cells, row["config"])))
     write_text_whole(output / "pareto.csv", "\n".join(lines) + "\n")
     write_plot(output / "pareto.png", points)
     return rows

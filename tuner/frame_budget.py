@@ -1,6 +1,9 @@
 """The best picture within a frame's time: from the cost model, then settled and verified in the runtime."""
 
-from collections.abc import Callable, Sequence
+import hashlib
+import importlib.metadata
+import json
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -11,17 +14,21 @@ from renderer.errors import InputError
 from renderer.runtime import Runtime
 from renderer.tuned_config import TunedConfig
 from tuner.cost_model import (
+    COUNTS,
     INTERLEAVES,
     MAP_SIZES,
     CostModel,
     FrameChoice,
+    costs_key,
     default_choice,
     measured_cost_model,
     rsm_resolutions,
 )
 from tuner.fit_density import (
+    FEW_VPLS,
     HELD_OUT_ROTATIONS,
     RELAXATION,
+    ROTATIONS,
     DensityFit,
     fit_density,
     rotated_views,
@@ -39,7 +46,7 @@ LEAST, MOST = 0.93, 1.0
 """Of the budget, between which a settled frame is left as it is."""
 OVER = 1.05
 """Of the budget, above which no frame may stay."""
-TRIES = 8
+TRIES = 10
 FRAMES = 7
 """Timed each time; the median counts."""
 SHADOW_SHARE = 0.5
@@ -49,7 +56,8 @@ LEAST_COUNT = 4
 CHOICE_ROTATIONS = 3
 GUESSED_IMPORTANCE = 0.75
 """η while the count is not yet known: what it costs does not depend on its value."""
-PARETO_POINTS = 6
+_CHOSEN, _FITTED = 0.25, 0.9
+"""Of a fit's work: done once the choice is made, and once density and falloff are fitted."""
 
 Progress = Callable[[float], None]
 
@@ -115,10 +123,12 @@ class FrameBudget:
             start.parameters, density_importance=GUESSED_IMPORTANCE, density_relaxation=RELAXATION
         )
         self._start = replace(start, parameters=guessed)
-        self.costs: CostModel = measured_cost_model(
+        self._runtimes: dict[FrameChoice, Runtime] = {}
+        self.default_choice = default_choice(self._timed[0])
+        measured = measured_cost_model(
             prepared.scene, self._timed, self._start, prepared.runtime.context, progress
         )
-        self._runtimes: dict[FrameChoice, Runtime] = {}
+        self.costs: CostModel = measured.scaled(self._level(measured))
 
     def least_milliseconds(self) -> float:
         """The least budget: of the cheapest frame in which every pixel has any VPLs to speak of."""
@@ -133,34 +143,53 @@ class FrameBudget:
         Raises:
             InputError: no frame is as fast as that, or none was when it was measured.
         """
-        frame = self._settle(self._best_choice(budget), budget)
+        report = progress or (lambda share: None)
+        choice = self._best_choice(budget, lambda share: report(_CHOSEN * share))
+        frame = self._settle(choice, budget)
         start = replace(self._start.parameters, vpl_count=frame.vpl_count)
-        fit = self._fitted(start, progress)
-        config = replace(self._start, parameters=fit.parameters)
+        fit = self._fitted(start, lambda share: report(_CHOSEN + (_FITTED - _CHOSEN) * share))
         # Without importance a frame is cheaper, and the falloff does not change what it costs.
-        settled = self._settle(frame.choice, budget, config.parameters)
+        settled = self._settle(choice, budget, fit.parameters)
         parameters = replace(fit.parameters, vpl_count=settled.vpl_count)
         if abs(settled.vpl_count - frame.vpl_count) > 0.1 * frame.vpl_count:
             parameters = self._falloff_at(parameters)
-        runtime = self._runtime(settled.choice)
+        runtime = self.runtime(settled.choice)
         rotations = table_rotations(HELD_OUT_ROTATIONS, self._seed, held_out=True)
         errors = rotation_errors(runtime, self._views, parameters, rotations)
         predicted = self.costs.milliseconds(settled.choice, settled.vpl_count)
+        report(1.0)
         return BudgetFit(budget, settled, predicted, parameters, fit.descent, float(errors.mean()), runtime)
 
-    def front(self, progress: Progress | None = None) -> tuple[BudgetFit, ...]:
-        """Fits over the range of useful budgets; a point that another beats in time and error is left out."""
-        least = 1.1 * self.least_milliseconds()
-        most = max(4.0 * least, self.costs.milliseconds(default_choice(self._timed[0]), 1024))
-        points: list[BudgetFit] = []
-        for index, budget in enumerate(np.geomspace(least, most, PARETO_POINTS)):
-            try:
-                points.append(self.fit(float(budget)))
-            except InputError:
-                continue  # the cheapest frame did not measure as predicted: the front starts later
-            if progress is not None:
-                progress((index + 1) / PARETO_POINTS)
-        return pareto_front(points)
+    def content_key(self) -> str:
+        """Of all that fits depend on, but for how fast the machine is at the moment."""
+        renderer = self._prepared.runtime.opengl_renderer
+        parts = [
+            costs_key(renderer, self._prepared.scene, self._timed, self._start),
+            importlib.metadata.version("vpltune"),
+            self._start.parameters.as_dict(),
+            self._seed,
+        ]
+        digest = hashlib.sha256(json.dumps(parts).encode())
+        for view in self._views:
+            for half in (view.reference.irradiance_a, view.reference.irradiance_b):
+                digest.update(f"{half.shape};".encode())
+                digest.update(np.ascontiguousarray(half).tobytes())
+        return digest.hexdigest()
+
+    def milliseconds(self, runtime: Runtime, parameters: ArtistParameters, frames: int = FRAMES) -> float:
+        """Of the slowest view's frame, as it measures now."""
+        runtime.parameters = parameters
+        return max(runtime.frame_milliseconds(view, frames) for view in self._timed)
+
+    def _level(self, costs: CostModel) -> float:
+        """How much longer frames take than the model says: passes overlap in them, and a model is kept longer
+        than a machine is as busy as it was."""
+        choice = self.default_choice
+        runtime = self.runtime(choice)
+        measured = sum(
+            self.milliseconds(runtime, replace(self._start.parameters, vpl_count=count)) for count in COUNTS
+        )
+        return measured / sum(costs.milliseconds(choice, count) for count in COUNTS)
 
     def _choices(self, budget: float) -> list[FrameChoice]:
         """All ways to gather, with the finest RSM that leaves enough of the budget."""
@@ -177,16 +206,18 @@ class FrameBudget:
         costs = self.costs.rsm_resolution[resolution]
         return sum(costs[name].fixed for name in names if name in costs)
 
-    def _best_choice(self, budget: float) -> FrameChoice:
+    def _best_choice(self, budget: float, progress: Progress) -> FrameChoice:
         """Least error of the start's own parameters, each choice with the VPLs that it can pay for."""
         rotations = table_rotations(CHOICE_ROTATIONS, self._seed)
         errors = {}
-        for choice in self._choices(budget):
+        choices = self._choices(budget)
+        for index, choice in enumerate(choices):
+            progress(index / len(choices))
             count = min(self.costs.count_within(choice, AIM * budget), parameter_spec("vpl_count").high)
             if count < LEAST_COUNT * choice.interleave**2:
                 continue  # every pixel of a block needs VPLs of its own
             parameters = replace(self._start.parameters, vpl_count=int(count))
-            errors[choice] = rotation_errors(self._runtime(choice), self._views, parameters, rotations).mean()
+            errors[choice] = rotation_errors(self.runtime(choice), self._views, parameters, rotations).mean()
         if not errors:
             raise InputError(
                 f"--budget-ms: must be at least {self.least_milliseconds():.3g} on this machine for "
@@ -197,8 +228,8 @@ class FrameBudget:
     def _settle(
         self, choice: FrameChoice, budget: float, parameters: ArtistParameters | None = None
     ) -> SettledFrame:
-        """Change the count until the measured frame fits: the slope is the model's, its level measured."""
-        runtime = self._runtime(choice)
+        """Change the count until the measured frame fits, twice: of many tries one would pass by luck."""
+        runtime = self.runtime(choice)
         chosen = self._start.parameters if parameters is None else parameters
         spec = parameter_spec("vpl_count")
         expected = self.costs.count_within(choice, AIM * budget)
@@ -206,14 +237,15 @@ class FrameBudget:
         slope, measured = self.costs.per_vpl(choice), {}
         for attempt in range(TRIES):
             count = int(np.clip(round(wanted), spec.low, spec.high))
-            runtime.parameters = replace(chosen, vpl_count=count)
-            taken = max(runtime.frame_milliseconds(view, FRAMES) for view in self._timed)
+            taken = self.milliseconds(runtime, replace(chosen, vpl_count=count))
+            confirmed = count in measured
             # A count that is asked for again has been timed on a quieter or busier machine: both count.
-            measured[count] = taken if count not in measured else 0.5 * (taken + measured[count])
-            if LEAST * budget <= measured[count] <= MOST * budget:
+            measured[count] = 0.5 * (taken + measured[count]) if confirmed else taken
+            if not LEAST * budget <= measured[count] <= MOST * budget:
+                slope = _slope(measured, slope)
+                wanted = max(count + (AIM * budget - measured[count]) / slope, 0.25 * count)
+            elif confirmed:
                 return SettledFrame(choice, count, measured[count], attempt + 1)
-            slope = _slope(measured, slope)
-            wanted = max(count + (AIM * budget - measured[count]) / slope, 0.25 * count)
         fitting = {count: taken for count, taken in measured.items() if taken <= OVER * budget}
         if not fitting:
             raise InputError(
@@ -224,29 +256,29 @@ class FrameBudget:
         return SettledFrame(choice, best, fitting[best], TRIES)
 
     def _fitted(self, start: ArtistParameters, progress: Progress | None) -> DensityFit:
-        runtime = self._prepared.runtime
-        return fit_density(runtime, self._views, start, seed=self._seed, progress=progress)
+        # The more VPLs, the less does one placement differ from another: the work is that of few.
+        rotations = int(np.clip(ROTATIONS * FEW_VPLS // start.vpl_count, 2, ROTATIONS))
+        return fit_density(
+            self._prepared.runtime,
+            self._views,
+            start,
+            seed=self._seed,
+            rotations=table_rotations(rotations, self._seed),
+            progress=progress,
+        )
 
     def _falloff_at(self, parameters: ArtistParameters) -> ArtistParameters:
         rotations = table_rotations(HELD_OUT_ROTATIONS, self._seed)
         captured = rotated_views(self._prepared.runtime, self._views, parameters, rotations)
         return fit_falloff(captured, parameters, seed=self._seed, held=held_for(self._start.visibility))[0]
 
-    def _runtime(self, choice: FrameChoice) -> Runtime:
+    def runtime(self, choice: FrameChoice) -> Runtime:
+        """What draws so; the same one each time."""
         if choice not in self._runtimes:
             self._runtimes[choice] = choice.runtime(
                 self._prepared.scene, self._start, self._prepared.runtime.context
             )
         return self._runtimes[choice]
-
-
-def pareto_front(points: Sequence[BudgetFit]) -> tuple[BudgetFit, ...]:
-    """Those that no other beats in both time and error, by rising time."""
-    front: list[BudgetFit] = []
-    for point in sorted(points, key=lambda point: (point.frame.milliseconds, point.relmse)):
-        if not front or point.relmse < front[-1].relmse:
-            front.append(point)
-    return tuple(front)
 
 
 def _slope(measured: dict[int, float], model: float) -> float:

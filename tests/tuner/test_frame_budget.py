@@ -12,7 +12,7 @@ from renderer.artist_parameters import ArtistParameters
 from renderer.errors import InputError
 from renderer.runtime import Runtime
 from renderer.tuned_config import TunedConfig, read_config
-from tuner import cost_model, frame_budget
+from tuner import cost_model, frame_budget, pareto_front
 from tuner.commands.budget_flags import budget_from_flags, render_flags, with_vpl_count
 from tuner.cost_model import CostModel, FrameChoice, PassCost, measured_cost_model
 from tuner.fit_budget import BudgetOptions, fit_to_budget
@@ -48,7 +48,7 @@ def steady_clock(monkeypatch, tmp_path):
     monkeypatch.setattr(Runtime, "pass_milliseconds", lambda self, view, frames=5: pass_times(self))
     monkeypatch.setattr(Runtime, "frame_milliseconds", frame)
     monkeypatch.setattr(frame_budget, "HELD_OUT_ROTATIONS", 2)
-    monkeypatch.setattr("tuner.fit_density.ROTATIONS", 2)
+    monkeypatch.setattr(frame_budget, "ROTATIONS", 2)
     monkeypatch.setattr("tuner.fit_density._EXPONENTS", ())
     monkeypatch.setenv("VPLTUNE_CACHE", str(tmp_path / "cache"))
 
@@ -79,7 +79,7 @@ def test_a_budget_below_the_cheapest_frame_is_refused(steady_clock, prepared):
 @pytest.mark.slow
 def test_the_front_is_monotone_and_written(steady_clock, prepared, tmp_path, monkeypatch):
     """More time, less error; each point's config reads back, and table and plot are there."""
-    monkeypatch.setattr(frame_budget, "PARETO_POINTS", 3)
+    monkeypatch.setattr(pareto_front, "POINTS", 3)
     parameters, _, found = fit_to_budget(
         prepared, START, BudgetOptions(None, pareto=True, frame_size=(24, 18)), tmp_path
     )
@@ -147,7 +147,10 @@ def test_flags():
 
 
 def test_the_next_command_draws_as_the_budget_did():
+    """Or, where only a front was asked for, as its last point, whose config is tuned.json."""
     choice = {"interleave": 4, "visibility_map_size": 8, "rsm_resolution": 256}
-    flags = render_flags({"budget": {"choice": choice, "frame_size": [64, 48]}})
-    assert flags == ["--interleave=4", "--map-size=8", "--rsm-resolution=256", "--size=64x48"]
-    assert render_flags({}) == []
+    fit = {"choice": choice, "frame_size": [64, 48]}
+    for document in ({"budget": fit}, {"pareto": [{}, fit]}, {"budget": fit, "pareto": [{}]}):
+        flags = render_flags(document)
+        assert flags == ["--interleave=4", "--map-size=8", "--rsm-resolution=256", "--size=64x48"]
+    assert render_flags({}) == render_flags({"pareto": []}) == []

@@ -38,15 +38,19 @@ def budget_from_flags(
 
 
 def render_flags(document: Mapping[str, Any]) -> list[str]:
-    """What `vpltune render` needs to be told to draw as the budget's frames were."""
-    if "budget" not in document:
+    """What `vpltune render` needs to be told to draw tuned.json as the budget's frames were.
+
+    Without a budget that is the front's last point.
+    """
+    fits = [document["budget"]] if "budget" in document else document.get("pareto", [])
+    if not fits:
         return []
-    choice = document["budget"]["choice"]
+    choice, frame_size = fits[-1]["choice"], fits[-1]["frame_size"]
     return [
         f"--interleave={choice['interleave']}",
         f"--map-size={choice['visibility_map_size']}",
         f"--rsm-resolution={choice['rsm_resolution']}",
-        "--size={}x{}".format(*document["budget"]["frame_size"]),
+        "--size={}x{}".format(*frame_size),
     ]
 
 
@@ -75,7 +79,7 @@ def _front_table(points: list[Mapping[str, Any]]) -> Any:
     from rich.table import Table
 
     table = Table(title="Error against frame time", title_justify="left")
-    for heading in ("ms", "relMSE", "VPLs", "interleave", "RSM", "config"):
+    for heading in ("ms", "relMSE", "VPLs", "interleave", "maps", "RSM", "config"):
         table.add_column(heading, justify="left" if heading == "config" else "right")
     for point in points:
         choice = point["choice"]
@@ -84,6 +88,7 @@ def _front_table(points: list[Mapping[str, Any]]) -> Any:
             f"{point['relmse']:.3g}",
             str(point["vpl_count"]),
             str(choice["interleave"]),
+            str(choice["visibility_map_size"]),
             str(choice["rsm_resolution"]),
             point["config"],
         )

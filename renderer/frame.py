@@ -101,13 +101,14 @@ class Frame:
         self._scene_statistics: SceneStatisticsPass | None = None
         if auto_parameters is not None:
             self._scene_statistics = SceneStatisticsPass(context, self._visibility)
-        self._vpl_gather = VplGatherPass(context, options.interleave, self._visibility)
+        interleave = options.interleave_for(vpl_count)
+        self._vpl_gather = VplGatherPass(context, interleave, self._visibility)
         self._interleaved_filter: InterleavedFilterPass | None = None
-        if options.interleave > 1:
+        if interleave > 1:
             self._interleaved_direction = create_direction_target(context, size)
             self._pixel_list = create_pixel_list(context, size)
             self._interleaved_filter = InterleavedFilterPass(
-                context, options.interleave, refine=True, relight=True, shadowed=hierarchy is not None
+                context, interleave, refine=True, relight=True, shadowed=hierarchy is not None
             )
         self._screen_space_indirect = ScreenSpaceIndirectPass(context, size, rsm_resolution, cells)
         self._screen_space_filter = InterleavedFilterPass(context, SCREEN_SPACE_BLOCK, add_base=True)

@@ -22,7 +22,7 @@ class RuntimeOptions:
     interleave: int = 1
     """One of `INTERLEAVES`: pixels along the side of a block that shares the VPLs out among its pixels. 1
     gathers every VPL at every pixel, which is what the tuner's surrogate is a twin of; 4 is some ten times
-    faster."""
+    faster. Where there are fewer VPLs than pixels in a block, blocks are smaller."""
 
     light_path: LightPath = "auto"
     """How dynamic lights are drawn: as blended volumes, in tiles, or in whichever of the two is measured to
@@ -50,6 +50,14 @@ class RuntimeOptions:
     """Time constant, in frames, over which the parameters of a config with a prior (`auto`) follow what is
     measured. 0 takes what each picture asks for, as a still needs it; a clip or a game has 15, a quarter of a
     second, and then no parameter moves by more than `passes.auto_parameters.LARGEST_STEP` a frame."""
+
+    def interleave_for(self, vpl_count: int) -> int:
+        """The side of a block, as large as asked for where each of its pixels gets a VPL.
+
+        Without, most pixels of a window are dark, and a window at the picture's border that has none of the
+        lit ones passes for unlit: one VPL shared among 64 pixels lost a tenth of its light.
+        """
+        return max(side for side in INTERLEAVES if side <= self.interleave and side**2 <= max(1, vpl_count))
 
     def __post_init__(self) -> None:
         if self.interleave not in INTERLEAVES:

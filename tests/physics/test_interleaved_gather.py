@@ -56,6 +56,28 @@ def test_energy_is_that_of_the_full_gather(gl_context, light, interleave):
     assert not shared.vpl_irradiance[~seen].any()
 
 
+@pytest.mark.parametrize("vpl_count", [1, 3, 20, 64])
+def test_energy_of_few_vpls_is_that_of_the_full_gather(gl_context, vpl_count):
+    """Mean irradiance within 3 % for blocks of 8 and as many VPLs or fewer: shared among 64 pixels, one VPL
+    lost 15 % of its light. One or three are gathered in full, to the last bit."""
+    view = room_view("spot", (64, 48))
+    full = captured(gl_context, colored_room(), view, 1, vpl_count=vpl_count)
+    shared = captured(gl_context, colored_room(), view, 8, vpl_count=vpl_count)
+    if vpl_count < 4:
+        np.testing.assert_array_equal(shared.vpl_irradiance, full.vpl_irradiance)
+    assert energy_ratio(shared.vpl_irradiance[full.valid], full.vpl_irradiance[full.valid]) == pytest.approx(
+        1, rel=0.03
+    )
+
+
+def test_blocks_are_no_larger_than_vpls_go_round():
+    asked = RuntimeOptions(interleave=8)
+    assert [asked.interleave_for(count) for count in (1, 3, 4, 15, 16, 63, 64, 1024)] == [
+        *(1, 1, 2, 2, 4, 4, 8, 8)
+    ]
+    assert RuntimeOptions(interleave=2).interleave_for(1024) == 2
+
+
 @pytest.mark.parametrize("interleave", [2, 4, 8])
 def test_an_open_plane_is_the_mean_over_its_window(gl_context, interleave):
     """On a plane every subset counts once: only the light's change within the window is left, below 0.1 %.

@@ -1,16 +1,18 @@
 """What each kind of visibility leaves of the error: none, mean transmittance, maps, rays; untuned and tuned.
 
 Every scene that can be loaded, three views with a light position each, `VPLS` VPLs: fitted on two of them,
-measured on those and on the third. The ceiling has the same VPLs and rays towards every pixel.
+measured on those and on the third. The ceiling has the same VPLs and rays towards every pixel; maps that are
+not refined show what the rays at silhouettes are worth.
 
 `python -m benchmarks.visibility_quality FILE [SCENE …]` writes each scene's figures into a JSON file as they
-come, keeps what is there, and ends with the summary: a long run may be done in pieces.
+come, keeps what is there, and ends with the summary and the scenes that were named: a long run may be done in
+pieces.
 """
 
 import json
 import sys
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from statistics import median
 
@@ -20,8 +22,10 @@ from benchmarks.row import Row
 from benchmarks.scene_library import present_scenes
 from renderer.artist_parameters import ArtistParameters
 from renderer.atomic_file import write_text_whole
+from renderer.runtime import Runtime
+from renderer.runtime_options import RuntimeOptions
 from renderer.tuned_config import TunedConfig, Visibility
-from tuner.captured_view import CapturedView, runtime_irradiance
+from tuner.captured_view import CapturedView, capture_views, runtime_irradiance
 from tuner.evaluate import SPLITS, surrogate_irradiance
 from tuner.fit_falloff import fit_falloff, fit_to, fit_views
 from tuner.fit_visibility import fit_visibility
@@ -31,6 +35,7 @@ from tuner.view_metrics import mean_metrics, view_metrics
 
 VPLS = 256
 MODES: tuple[Visibility, ...] = ("none", "transmittance", "maps")
+UNREFINED = "maps_unrefined"
 CEILING = "ceiling"
 STATES = ("untuned", "tuned")
 DEFAULT = ArtistParameters(vpl_count=VPLS)
@@ -56,13 +61,8 @@ def scene_figures(path: Path) -> Figures:
     figures: Figures = {}
     for mode in MODES:
         prepared = _prepared(path, mode)
-        tuned = _tuned(_of_fitted(prepared.views), mode)
-        figures[mode] = {
-            state: _figures(
-                prepared.views, lambda view, p=parameters, r=prepared.runtime: runtime_irradiance(r, p, view)
-            )
-            for state, parameters in zip(STATES, (DEFAULT, tuned), strict=True)
-        }
+        figures[mode] = _drawn_figures(prepared)
+    figures[UNREFINED] = _drawn_figures(_unrefined(prepared))
     seen = {view.view.name: ray_visibility(prepared, view) for view in prepared.views}
     fitted = _of_fitted(prepared.views)
     tuned, _ = fit_falloff(fitted, DEFAULT, visibility=tuple(seen[view.view.name] for view in fitted))
@@ -76,27 +76,55 @@ def scene_figures(path: Path) -> Figures:
 
 
 def summary_rows(measured: dict[str, Figures]) -> list[Row]:
-    """Over scenes and splits: the median and the worst ratio of maps to ceiling, in relMSE."""
+    """Over scenes and splits: the median and the worst ratio of maps to ceiling, in relMSE, and the median of
+    that of maps that are not refined."""
     found = []
     for state in STATES:
-        ratios = {
-            f"{name}.{split}": figures["maps"][state][split]["relmse"] / ceiling
-            for name, figures in measured.items()
-            for split in SPLITS
-            # A scene without indirect light has nothing to compare.
-            if (ceiling := figures[CEILING][state][split]["relmse"]) > 1e-6
-        }
+        ratios = _over_ceiling(measured, "maps", state)
         worst = max(ratios, key=lambda name: ratios[name])
+        unrefined = median(_over_ceiling(measured, UNREFINED, state).values())
         found += [
             Row(f"maps_over_ceiling_{state}_median", median(ratios.values()), "1", "limit", 1.5),
             Row(f"maps_over_ceiling_{state}_worst", ratios[worst], "1", f"limit; {worst}", 3.0),
+            Row(f"{UNREFINED}_over_ceiling_{state}_median", unrefined, "1", CEILING, 1.0),
         ]
     return found
+
+
+def _over_ceiling(measured: dict[str, Figures], mode: str, state: str) -> dict[str, float]:
+    """By scene and split: relMSE over the ceiling's."""
+    return {
+        f"{name}.{split}": figures[mode][state][split]["relmse"] / ceiling
+        for name, figures in measured.items()
+        for split in SPLITS
+        # A scene without indirect light has nothing to compare.
+        if (ceiling := figures[CEILING][state][split]["relmse"]) > 1e-6
+    }
 
 
 def _prepared(path: Path, mode: Visibility) -> PreparedScene:
     config = TunedConfig(DEFAULT, visibility=mode)
     return prepare_scene(path, SceneOptions(views=2), config, Stopwatch(), lambda stage, share: None)
+
+
+def _unrefined(prepared: PreparedScene) -> PreparedScene:
+    """The same with maps of one ray a texel at silhouettes too."""
+    config = TunedConfig(DEFAULT, visibility=prepared.runtime.visibility)
+    options = RuntimeOptions(visibility_map_refinement=1)
+    runtime = Runtime(prepared.scene, config, options, context=prepared.runtime.context)
+    references = tuple(view.reference for view in prepared.views)
+    captured = capture_views(runtime, tuple(view.view for view in prepared.views), references)
+    return replace(prepared, runtime=runtime, views=captured)
+
+
+def _drawn_figures(prepared: PreparedScene) -> dict[str, dict[str, dict[str, float]]]:
+    """By state and split, as the runtime draws them."""
+    runtime = prepared.runtime
+    tuned = _tuned(_of_fitted(prepared.views), runtime.visibility)
+    return {
+        state: _figures(prepared.views, lambda view, p=parameters: runtime_irradiance(runtime, p, view))
+        for state, parameters in zip(STATES, (DEFAULT, tuned), strict=True)
+    }
 
 
 def _of_fitted(views: tuple[CapturedView, ...]) -> tuple[CapturedView, ...]:
@@ -161,11 +189,12 @@ def _main(path: Path, names: list[str]) -> None:
     measured = json.loads(path.read_text()) if path.exists() else {}
     scenes = present_scenes()
     for name in names or list(scenes):
-        if name not in measured:
+        if UNREFINED not in measured.get(name, {}):
             measured[name] = scene_figures(scenes[name])
             write_text_whole(path, json.dumps(measured, indent=1) + "\n")
             print(name, flush=True)
-    for row in summary_rows(measured):
+    complete = {name: figures for name, figures in measured.items() if UNREFINED in figures}
+    for row in [*summary_rows(complete), *(row for name in names for row in _rows_of(name, measured[name]))]:
         print(f"{row.name} {row.value:.3f} ({row.against} {row.against_value:g})")
 
 

@@ -11,7 +11,7 @@ SAMPLES_OF_VPL = 4
 LARGEST_COUNT = 4096
 """VPLs. More are left where they were drawn: every sample looks at every VPL."""
 NORMAL_REACH = 0.7
-"""In L: how far apart it counts that normals differ by 1. Of 0.3, 0.7 and 1.5 the best in six rooms."""
+"""In L: how far apart it counts that normals differ by 1. The best of 0.3, 0.7 and 1.5."""
 
 
 def sample_count(vpl_count: int) -> int:

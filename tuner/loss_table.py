@@ -2,12 +2,11 @@
 
 With y the picture at intensity 1, the loss Σ w (ky − a)(ky − b) is A k² − B k + C with A = Σ w y²,
 B = Σ w y (a + b) and C = Σ w a b, so only A and B depend on the other parameters, and they are smooth in
-them. They are tabulated over α, β and σ through the surrogate (`tuner.binned_gather`,
-`tuner.vpl_visibility`) and interpolated: cubic in α, linear in β and σ, whose nodes are coarse because
-each bins the VPLs anew.
+them. They are tabulated over α, β and σ through the surrogate (`tuner.vpl_gather`, `tuner.vpl_visibility`)
+and interpolated: cubic in α, linear in β and σ.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
@@ -16,19 +15,18 @@ from jaxtyping import Array, Float, Float32
 
 from renderer.artist_parameters import ArtistParameters, parameter_spec
 from renderer.auto_prior import AUTO_PARAMETERS, place_of, value_at
-from tuner.binned_gather import bin_vpls, node_falloff
 from tuner.captured_view import CapturedView
-from tuner.losses.relative_squared_error import Target, target_of
-from tuner.virtual_point_lights import gather_inputs
-from tuner.vpl_gather import FalloffParameters
-from tuner.vpl_visibility import map_visibility
+from tuner.losses.relative_squared_error import EVEN_SHARE, Target, target_of
+from tuner.virtual_point_lights import Receivers, VirtualPointLights, gather_inputs
+from tuner.vpl_gather import FalloffParameters, gather
+from tuner.vpl_visibility import VisibilityParameters, map_texels, seen_share, surface_overlap
 
-RECEIVERS = 512
+RECEIVERS = 2048
 """Pixels of a view that a table looks at."""
 
 FOOTPRINT_PLACES = tuple(np.linspace(0.15, 0.75, 11).tolist())
 BIAS_PLACES = (0.0, 0.25, 0.5, 0.75, 1.0)
-SOFTNESS_PLACES = (0.0, 0.35, 0.7, 1.0)
+SOFTNESS_PLACES = tuple(np.linspace(0.0, 1.0, 7).tolist())
 """Nodes along the parameters' axes: α from 0.12 to 4.5; β and σ over all of theirs."""
 
 _PLACES = (FOOTPRINT_PLACES, BIAS_PLACES, SOFTNESS_PLACES)
@@ -53,52 +51,52 @@ class LossTable:
     """C."""
 
 
-def loss_table(view: CapturedView, parameters: ArtistParameters, seed: int) -> LossTable:
+def loss_table(
+    view: CapturedView, parameters: ArtistParameters, seed: int, even_share: float = EVEN_SHARE
+) -> LossTable:
     """The table of one view, from the buffers and the visibility maps that it was captured with.
 
-    A view in which no light arrives has a table of zeros.
+    `even_share` as `target_of` has it: 0 tabulates relMSE alone. A view in which no light arrives has a table
+    of zeros.
     """
     pixels = view.fitted_pixels(RECEIVERS, seed)
     receivers, vpls = gather_inputs(view.captured, pixels)
     flat = np.flatnonzero(view.captured.valid.ravel())[pixels]
     halves = (view.reference.irradiance_a, view.reference.irradiance_b)
-    target = target_of(*(half.reshape(-1, 3)[flat] for half in halves))
-    bias, softness = (parameter_spec(name) for name in ("visibility_bias", "visibility_softness"))
-    shape = tuple(map(len, (BIAS_PLACES, SOFTNESS_PLACES, FOOTPRINT_PLACES)))
-    kappa = jnp.float32(parameters.falloff_transmittance)
-    square, product = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
-    for i, bias_place in enumerate(BIAS_PLACES):
-        for j, softness_place in enumerate(SOFTNESS_PLACES):
-            there = replace(
-                parameters,
-                visibility_bias=value_at(bias, bias_place),
-                visibility_softness=value_at(softness, softness_place),
-            )
-            binned = bin_vpls(receivers, vpls, map_visibility(view.captured, receivers, vpls, there))
-            square[i, j], product[i, j] = _sums(
-                binned.irradiance, binned.distance, binned.footprint, kappa, target
-            )
+    target = target_of(*(half.reshape(-1, 3)[flat] for half in halves), even_share)
+    maps = view.captured.visibility_maps
+    overlap = None if maps is None else surface_overlap(receivers, vpls, map_texels(maps))
+    square, product = _sums(receivers, vpls, overlap, jnp.float32(parameters.falloff_transmittance), target)
     constant = np.sum(np.asarray(target.weight * target.half_a * target.half_b, np.float64))
-    return LossTable(square.transpose(2, 0, 1), product.transpose(2, 0, 1), np.array(constant, np.float32))
+    return LossTable(np.asarray(square), np.asarray(product), np.array(constant, np.float32))
 
 
 @jax.jit
 def _sums(
-    irradiance: Array, distance: Array, footprint: Array, transmittance: Array, target: Target
+    receivers: Receivers,
+    vpls: VirtualPointLights,
+    overlap: Array | None,
+    transmittance: Array,
+    target: Target,
 ) -> tuple[Array, Array]:
-    """A and B at every node of α."""
-    spec = parameter_spec("falloff_footprint")
-    footprints = jnp.array([value_at(spec, place) for place in FOOTPRINT_PLACES], jnp.float32)
+    """A and B at every node."""
+    footprints, biases, softnesses = (
+        jnp.array([value_at(parameter_spec(name), place) for place in places], jnp.float32)
+        for name, places in zip(AUTO_PARAMETERS[1:], _PLACES, strict=True)
+    )
 
-    def at(falloff_footprint: Array) -> tuple[Array, Array]:
-        falloff = node_falloff(
-            distance, footprint, FalloffParameters(jnp.ones(()), falloff_footprint, transmittance)
-        )
-        picture = jnp.matmul(irradiance, falloff, precision=jax.lax.Precision.HIGHEST)
+    def at(footprint: Array, seen: Array | None) -> tuple[Array, Array]:
+        picture = gather(receivers, vpls, FalloffParameters(jnp.ones(()), footprint, transmittance), seen)
         weighed = target.weight * picture
         return jnp.sum(weighed * picture), jnp.sum(weighed * (target.half_a + target.half_b))
 
-    return jax.vmap(at)(footprints)
+    def at_all_footprints(node: tuple[Array, Array]) -> tuple[Array, Array]:
+        seen = None if overlap is None else seen_share(overlap, VisibilityParameters(*node))
+        return jax.vmap(at, in_axes=(0, None))(footprints, seen)
+
+    grid = jnp.meshgrid(biases, softnesses, indexing="ij")
+    sums = jax.lax.map(at_all_footprints, tuple(values.ravel() for values in grid))
+    return tuple(values.T.reshape(*map(len, _PLACES)) for values in sums)
 
 
 def table_loss(table: LossTable, point: Float[Array | np.ndarray, " parameters"]) -> Float[Array, ""]:

@@ -6,7 +6,7 @@ A scene's part is made once and kept in the user's cache folder, under all that 
 import hashlib
 import io
 import json
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 
 import numpy as np
 from jaxtyping import Bool, Float32, Int32
@@ -14,12 +14,13 @@ from jaxtyping import Bool, Float32, Int32
 from renderer.artist_parameters import ArtistParameters, parameter_spec
 from renderer.atomic_file import written_whole
 from renderer.auto_prior import AUTO_PARAMETERS
-from renderer.runtime import Runtime
+from renderer.runtime import DEFAULT_OPTIONS, Runtime
 from renderer.scene import Scene
 from renderer.scene_statistics import STATISTIC_NAMES
 from renderer.tuned_config import TunedConfig
 from renderer.view_placement import views_for_scene
 from renderer.views import View, views_to_json
+from renderer.visibility_map_layout import VisibilityMapLayout
 from tuner.captured_view import CapturedView
 from tuner.loss_table import (
     BIAS_PLACES,
@@ -39,12 +40,18 @@ FITTED, HELD_OUT = 2, 2
 NOISE_TARGET, MAX_SAMPLES = 3e-3, 1024
 RSM_RESOLUTION = 512
 
-ROTATIONS = {16: ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1)), 64: ((0.0, 0.0), (0.3, 0.7)), 256: ((0.0, 0.0),)}
+_ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.9, 0.4))
+ROTATIONS = {16: _ROTATIONS, 64: _ROTATIONS[:3], 256: _ROTATIONS[:2]}
 """VPL counts, and the rotations of the point table that each is captured with: few VPLs are noisy, and one
 placement's noise is not to be learnt."""
 
-CAPTURE_VERSION = 1
-"""Raise whenever the same scene gives other statistics or another loss: old entries are then passed over."""
+CAPTURE_VERSION = 2
+"""Raise whenever the same scene gives other statistics or another loss: old entries are then passed over.
+What the runtime's options and the maps' layout say is in the key by itself."""
+
+
+_TABLES = ("table", "relmse_table")
+_TABLE_PARTS = tuple(field.name for field in fields(LossTable))
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +61,9 @@ class PriorScene:
     name: str
     statistics: Float32[np.ndarray, "rows statistics"]
     table: LossTable
+    """Of the loss that fits have."""
+    relmse_table: LossTable
+    """Of relMSE alone, which pictures are judged by."""
     vpl_count: Int32[np.ndarray, " rows"]
     fitted: Bool[np.ndarray, " rows"]
     """Whether the row's view is one that a fit may see."""
@@ -71,8 +81,10 @@ def prior_scene(scene: Scene) -> PriorScene:
     if path.is_file():
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as arrays:
             found = {name: arrays[name] for name in arrays.files}
-        table = LossTable(*(found.pop(name) for name in ("square", "product", "constant")))
-        return PriorScene(name=scene.name, table=table, **found)
+        tables = {
+            name: LossTable(*(found.pop(f"{name}_{part}") for part in _TABLE_PARTS)) for name in _TABLES
+        }
+        return PriorScene(name=scene.name, **tables, **found)
     made = _captured(scene, views, prior_references(scene, views))
     buffer = io.BytesIO()
     np.savez_compressed(
@@ -80,9 +92,7 @@ def prior_scene(scene: Scene) -> PriorScene:
         statistics=made.statistics,
         vpl_count=made.vpl_count,
         fitted=made.fitted,
-        square=made.table.square,
-        product=made.table.product,
-        constant=made.table.constant,
+        **{f"{name}_{part}": getattr(getattr(made, name), part) for name in _TABLES for part in _TABLE_PARTS},
     )
     with written_whole(path) as temporary:
         temporary.write_bytes(buffer.getvalue())
@@ -102,7 +112,7 @@ def prior_references(scene: Scene, views: tuple[View, ...]) -> tuple[ReferenceVi
 
 
 def _captured(scene: Scene, views: tuple[View, ...], references: tuple[ReferenceView, ...]) -> PriorScene:
-    statistics, tables, counts, fitted = [], [], [], []
+    statistics, tables, relmse_tables, counts, fitted = [], [], [], [], []
     for vpl_count, rotations in ROTATIONS.items():
         parameters = replace(ArtistParameters(), vpl_count=vpl_count)
         runtime = Runtime(scene, TunedConfig(parameters, visibility="maps"), rsm_resolution=RSM_RESOLUTION)
@@ -111,12 +121,16 @@ def _captured(scene: Scene, views: tuple[View, ...], references: tuple[Reference
                 captured = CapturedView(view, reference, runtime.capture(view, rotation))
                 statistics.append(runtime.scene_statistics(view))
                 tables.append(loss_table(captured, parameters, seed=0))
+                relmse_tables.append(loss_table(captured, parameters, seed=0, even_share=0.0))
                 counts.append(vpl_count)
                 fitted.append(view.split == "fitted")
-    table = LossTable(
-        *(np.stack([getattr(table, name) for table in tables]) for name in ("square", "product", "constant"))
+    stacked = (
+        LossTable(*(np.stack([getattr(table, part) for table in of_rows]) for part in _TABLE_PARTS))
+        for of_rows in (tables, relmse_tables)
     )
-    return PriorScene(scene.name, np.stack(statistics), table, np.array(counts, np.int32), np.array(fitted))
+    return PriorScene(
+        scene.name, np.stack(statistics), *stacked, np.array(counts, np.int32), np.array(fitted)
+    )
 
 
 def _key(scene: Scene, views: tuple[View, ...]) -> str:
@@ -127,6 +141,7 @@ def _key(scene: Scene, views: tuple[View, ...]) -> str:
         "captures": [CAPTURE_VERSION, list(ROTATIONS.items()), NOISE_TARGET, MAX_SAMPLES, RSM_RESOLUTION],
         "statistics": STATISTIC_NAMES,
         "parameters": ArtistParameters().as_dict(),
+        "runtime": [asdict(DEFAULT_OPTIONS), VisibilityMapLayout.of(DEFAULT_OPTIONS).defines],
         "axes": [[spec.low, spec.high, spec.scale] for spec in axes],
         "nodes": [FOOTPRINT_PLACES, BIAS_PLACES, SOFTNESS_PLACES, RECEIVERS],
     }

@@ -9,7 +9,7 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float64
+from jaxtyping import Float64
 
 from renderer.artist_parameters import ArtistParameters
 from renderer.atomic_file import write_text_whole
@@ -45,8 +45,9 @@ class LearntPrior:
     prior: AutoPrior
     unseen: tuple[AutoPrior, ...]
     """For each scene, the prior of the fold that leaves it out."""
-    losses: dict[str, Float64[np.ndarray, "scenes counts splits"]]
-    """Of `auto` (the unseen prior), `fit` (the scene's own) and `default`; splits: fitted, held out."""
+    losses: dict[str, Float64[np.ndarray, "measures scenes counts splits"]]
+    """Of `auto` (the unseen prior), `fit` (the scene's own) and `default`; measures: the fit's loss, relMSE;
+    splits: fitted, held out."""
 
 
 def learn_prior(scenes: tuple[PriorScene, ...], progress: Progress) -> LearntPrior:
@@ -147,7 +148,7 @@ def library_scene(path: Path, name: str) -> Scene:
 
 def _losses(
     scenes: tuple[PriorScene, ...], rows: TrainingRows, fits: OwnFits, unseen: tuple[AutoPrior, ...]
-) -> dict[str, Float64[np.ndarray, "scenes counts splits"]]:
+) -> dict[str, Float64[np.ndarray, "measures scenes counts splits"]]:
     scene = np.asarray(rows.scene)
     statistics = np.asarray(rows.statistics, np.float64)
     points = np.array([unseen[s].point(row) for s, row in zip(scene, statistics, strict=True)], np.float32)
@@ -159,21 +160,16 @@ def _losses(
     counts = np.concatenate([each.vpl_count for each in scenes])
     fitted = np.concatenate([each.fitted for each in scenes])
 
-    def mean(values: np.ndarray, where: Bool[np.ndarray, "rows"]) -> float:
-        return float(values[where].mean(dtype=np.float64))
+    def means(values: np.ndarray, s: int) -> list[list[np.ndarray]]:
+        return [
+            [
+                values[:, (scene == s) & (counts == count) & (fitted == split)].mean(axis=1, dtype=np.float64)
+                for split in (True, False)
+            ]
+            for count in fits.vpl_counts
+        ]
 
     return {
-        name: np.array(
-            [
-                [
-                    [
-                        mean(values, (scene == s) & (counts == count) & (fitted == split))
-                        for split in (True, False)
-                    ]
-                    for count in fits.vpl_counts
-                ]
-                for s in range(len(scenes))
-            ]
-        )
+        name: np.moveaxis(np.array([means(values, s) for s in range(len(scenes))]), -1, 0)
         for name, values in of_rows.items()
     }

@@ -108,7 +108,7 @@ def gather(
             runtime does without visibility maps.
     """
     count = receivers.position.shape[0]
-    chunk_size = receivers_at_once(vpls.position.shape[0], PAIRS_AT_ONCE)
+    chunk_size = min(receivers_at_once(vpls.position.shape[0], PAIRS_AT_ONCE), max(count, 1))
     padding = ((0, -count % chunk_size), (0, 0))
 
     def chunked(values: Array) -> Array:

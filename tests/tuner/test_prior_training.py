@@ -41,9 +41,8 @@ def planted_scene(number: int) -> PriorScene:
     square = np.broadcast_to(1.0 / bowl[..., None, None], shape).astype(np.float32)
     # A k² − B k + C with A = 1/bowl, B = 2/bowl, C = 1 is least at k = 1, where it is 1 − 1/bowl.
     constant = np.ones(len(vpl_count), np.float32)
-    return PriorScene(
-        f"planted-{number}", statistics, LossTable(square, 2.0 * square, constant), vpl_count, fitted
-    )
+    table = LossTable(square, 2.0 * square, constant)
+    return PriorScene(f"planted-{number}", statistics, table, table, vpl_count, fitted)
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +82,6 @@ def test_what_is_left_out_is_not_seen(scenes):
     left_out = np.zeros((1, SCENES), bool)
     left_out[0, 3] = True
     turned = jax.tree.map(lambda values: values[:, ::-1] if values.ndim > 1 else values, scenes[3].table)
-    other = (*scenes[:3], dataclasses.replace(scenes[3], table=turned), *scenes[4:])
+    other = (*scenes[:3], dataclasses.replace(scenes[3], table=turned, relmse_table=turned), *scenes[4:])
     first, second = (train(training_rows(each, own_fits(each)), left_out)[0] for each in (scenes, other))
     np.testing.assert_allclose(np.array(first.weights), np.array(second.weights), rtol=1e-4, atol=1e-6)

@@ -8,6 +8,7 @@ import io
 import json
 from dataclasses import asdict, dataclass, fields, replace
 
+import moderngl
 import numpy as np
 from jaxtyping import Bool, Float32, Int32
 
@@ -69,11 +70,11 @@ class PriorScene:
     """Whether the row's view is one that a fit may see."""
 
 
-def prior_scene(scene: Scene) -> PriorScene:
+def prior_scene(scene: Scene, context: moderngl.Context) -> PriorScene:
     """The scene's captures, from the cache or made; the scene has a camera and lights of its own.
 
     Raises:
-        MachineError: no OpenGL.
+        MachineError: the GPU ran out of memory.
     """
     views = prior_views(scene)
     key = _key(scene, views)
@@ -85,7 +86,7 @@ def prior_scene(scene: Scene) -> PriorScene:
             name: LossTable(*(found.pop(f"{name}_{part}") for part in _TABLE_PARTS)) for name in _TABLES
         }
         return PriorScene(name=scene.name, **tables, **found)
-    made = _captured(scene, views, prior_references(scene, views))
+    made = _captured(context, scene, views, prior_references(scene, views))
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,
@@ -111,11 +112,14 @@ def prior_references(scene: Scene, views: tuple[View, ...]) -> tuple[ReferenceVi
     return reference_views(scene, views, noise_target=NOISE_TARGET, max_samples=MAX_SAMPLES)
 
 
-def _captured(scene: Scene, views: tuple[View, ...], references: tuple[ReferenceView, ...]) -> PriorScene:
+def _captured(
+    context: moderngl.Context, scene: Scene, views: tuple[View, ...], references: tuple[ReferenceView, ...]
+) -> PriorScene:
     statistics, tables, relmse_tables, counts, fitted = [], [], [], [], []
     for vpl_count, rotations in ROTATIONS.items():
         parameters = replace(ArtistParameters(), vpl_count=vpl_count)
-        runtime = Runtime(scene, TunedConfig(parameters, visibility="maps"), rsm_resolution=RSM_RESOLUTION)
+        config = TunedConfig(parameters, visibility="maps")
+        runtime = Runtime(scene, config, context=context, rsm_resolution=RSM_RESOLUTION)
         for view, reference in zip(views, references, strict=True):
             for rotation in rotations:
                 captured = CapturedView(view, reference, runtime.capture(view, rotation))

@@ -15,6 +15,7 @@ from renderer.artist_parameters import ArtistParameters
 from renderer.atomic_file import write_text_whole
 from renderer.auto_prior import AutoPrior
 from renderer.errors import InputError
+from renderer.gpu_context import create_context
 from renderer.scene import Scene
 from renderer.scene_file import read_scene
 from renderer.tuned_config import TunedConfig, write_config
@@ -117,13 +118,19 @@ def scene_sources(library: Path | None, generated: int, seed: int) -> dict[str, 
 def collected_scenes(
     sources: Mapping[str, Callable[[], Scene]], progress: Progress
 ) -> tuple[tuple[PriorScene, ...], dict[str, str]]:
-    """The captures of all scenes, and by name why some have none."""
+    """The captures of all scenes, and by name why some have none.
+
+    Raises:
+        MachineError: no OpenGL.
+    """
+    # One for all: those that runtimes make for themselves stay until the process ends.
+    context = create_context()
     found: list[PriorScene] = []
     left_out: dict[str, str] = {}
     for index, (name, made) in enumerate(sources.items()):
         progress(name, index / len(sources))
         try:
-            scene = prior_scene(made())
+            scene = prior_scene(made(), context)
         except InputError as error:
             left_out[name] = str(error).rpartition(f"{name}: ")[2]
             continue

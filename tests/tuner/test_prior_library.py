@@ -44,7 +44,9 @@ def test_captures_are_those_of_their_version(gl_context, monkeypatch):
     through_walls = Runtime(
         scene, TunedConfig(ArtistParameters(), visibility="none"), context=gl_context, rsm_resolution=128
     )
-    found = prior_library._captured(scene, views, (own_reference(through_walls.capture(views[0])),))
+    found = prior_library._captured(
+        gl_context, scene, views, (own_reference(through_walls.capture(views[0])),)
+    )
     table = jax.tree.map(lambda values: jnp.asarray(values[0]), found.table)
     point = default_point(ArtistParameters())
     losses = [float(table_loss(table, point + move)) for move in MOVES]

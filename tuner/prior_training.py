@@ -7,8 +7,8 @@ counts, views and both measures, the loss that fits have and relMSE alone, of
 
 so that no scene outweighs another, plus what is lost against the defaults where anything is, a pull towards
 them and a weight decay. Two measures, since a fit's loss lets relMSE rise where dark pixels leak: trained
-by it alone, a prior was worse by relMSE than the defaults on twice as many new scenes. Twin of the model:
-`renderer.auto_prior.AutoPrior`.
+by that loss alone, a prior was worse than the defaults, by relMSE, on up to twice as many new scenes. Twin of
+the model: `renderer.auto_prior.AutoPrior`.
 """
 
 from collections.abc import Iterable

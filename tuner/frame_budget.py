@@ -47,8 +47,10 @@ LEAST, MOST = 0.93, 1.0
 OVER = 1.05
 """Of the budget, above which no frame may stay."""
 TRIES = 10
-FRAMES = 7
-"""Timed each time; the median counts."""
+FRAMES, MOST_FRAMES = 7, 100
+"""Timed each time, of which the median counts: as many as fill `TIMED` in this range."""
+TIMED = 500.0
+"""Milliseconds: a machine that does other things beside is seldom as busy for less."""
 SHADOW_SHARE = 0.5
 """Of the budget, which RSM and placement may take at most before the RSM is made coarser."""
 LEAST_COUNT = 4
@@ -228,23 +230,28 @@ class FrameBudget:
     def _settle(
         self, choice: FrameChoice, budget: float, parameters: ArtistParameters | None = None
     ) -> SettledFrame:
-        """Change the count until the measured frame fits, twice: of many tries one would pass by luck."""
+        """Change the count until the measured frame fits: the slope is the model's, its level measured.
+
+        With the parameters that it will have, it must fit twice: of many tries one would pass by luck.
+        """
         runtime = self.runtime(choice)
         chosen = self._start.parameters if parameters is None else parameters
         spec = parameter_spec("vpl_count")
         expected = self.costs.count_within(choice, AIM * budget)
         wanted = expected if parameters is None else parameters.vpl_count
         slope, measured = self.costs.per_vpl(choice), {}
+        final = parameters is not None
+        frames = int(np.clip(TIMED / budget, FRAMES, MOST_FRAMES)) if final else FRAMES
         for attempt in range(TRIES):
             count = int(np.clip(round(wanted), spec.low, spec.high))
-            taken = self.milliseconds(runtime, replace(chosen, vpl_count=count))
+            taken = self.milliseconds(runtime, replace(chosen, vpl_count=count), frames)
             confirmed = count in measured
             # A count that is asked for again has been timed on a quieter or busier machine: both count.
             measured[count] = 0.5 * (taken + measured[count]) if confirmed else taken
             if not LEAST * budget <= measured[count] <= MOST * budget:
                 slope = _slope(measured, slope)
                 wanted = max(count + (AIM * budget - measured[count]) / slope, 0.25 * count)
-            elif confirmed:
+            elif confirmed or not final:
                 return SettledFrame(choice, count, measured[count], attempt + 1)
         fitting = {count: taken for count, taken in measured.items() if taken <= OVER * budget}
         if not fitting:

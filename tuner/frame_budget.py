@@ -54,7 +54,7 @@ TIMED = 500.0
 SHADOW_SHARE = 0.5
 """Of the budget, which RSM and placement may take at most before the RSM is made coarser."""
 LEAST_COUNT = 4
-"""VPLs, below which a budget is called too small."""
+"""VPLs for each pixel of a block, below which a budget is called too small."""
 CHOICE_ROTATIONS = 3
 GUESSED_IMPORTANCE = 0.75
 """η while the count is not yet known: what it costs does not depend on its value."""
@@ -236,14 +236,14 @@ class FrameBudget:
         """
         runtime = self.runtime(choice)
         chosen = self._start.parameters if parameters is None else parameters
-        spec = parameter_spec("vpl_count")
+        least, most = LEAST_COUNT * choice.interleave**2, int(parameter_spec("vpl_count").high)
         expected = self.costs.count_within(choice, AIM * budget)
         wanted = expected if parameters is None else parameters.vpl_count
         slope, measured = self.costs.per_vpl(choice), {}
         final = parameters is not None
         frames = int(np.clip(TIMED / budget, FRAMES, MOST_FRAMES)) if final else FRAMES
         for attempt in range(TRIES):
-            count = int(np.clip(round(wanted), spec.low, spec.high))
+            count = int(np.clip(round(wanted), least, most))
             taken = self.milliseconds(runtime, replace(chosen, vpl_count=count), frames)
             confirmed = count in measured
             # A count that is asked for again has been timed on a quieter or busier machine: both count.

@@ -3,8 +3,8 @@
 It knows nothing of light. Levenberg (1944) and Marquardt (1963): with J the Jacobian of the residuals r,
 a step s solves (JᵀJ + μ·max λ(JᵀJ)) s = −Jᵀr over the axes that are free, those along which the descent does
 not leave the cube. A step that does not lower the sum of squares, or is not finite, is taken back and damped
-more. On 15 scenes, from the defaults and from 64 random points each, all reached the least loss known, in 2
-to 11 steps where Newton took up to 19 and Adam 140.
+more. On 15 scenes, from 64 random points each, all but two of the points came within 0.1 % of the least loss
+known (`vpltune bench descent`).
 """
 
 from collections.abc import Callable

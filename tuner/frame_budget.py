@@ -47,7 +47,7 @@ LEAST, MOST = 0.93, 1.0
 OVER = 1.05
 """Of the budget, above which no frame may stay."""
 TRIES = 10
-FRAMES, MOST_FRAMES = 7, 100
+FRAMES, MOST_FRAMES = 3, 100
 """Timed each time, of which the median counts: as many as fill `TIMED` in this range."""
 TIMED = 500.0
 """Milliseconds: a machine that does other things beside is seldom as busy for less."""

@@ -87,7 +87,7 @@ def test_a_front_is_monotone_and_all_of_it_is_used():
     points = fit_front(PlantedBudget())
     assert len(points) == front.POINTS
     assert_monotone(points)
-    assert points[-1].frame.milliseconds == pytest.approx(11.24)  # 1,024 VPLs
+    assert points[-1].frame.milliseconds == pytest.approx(1.0 + 0.01 * front.DENSEST)
 
 
 def test_what_another_beats_is_left_out():

@@ -51,6 +51,8 @@ FRAMES, MOST_FRAMES = 3, 100
 """Timed each time, of which the median counts: as many as fill `TIMED` in this range."""
 TIMED = 500.0
 """Milliseconds: a machine that does other things beside is seldom as busy for less."""
+LEVEL_FRAMES = 15
+"""Timed at each of two counts, to tell how fast the machine is beside its cost model."""
 SHADOW_SHARE = 0.5
 """Of the budget, which RSM and placement may take at most before the RSM is made coarser."""
 LEAST_COUNT = 4
@@ -189,7 +191,8 @@ class FrameBudget:
         choice = self.default_choice
         runtime = self.runtime(choice)
         measured = sum(
-            self.milliseconds(runtime, replace(self._start.parameters, vpl_count=count)) for count in COUNTS
+            self.milliseconds(runtime, replace(self._start.parameters, vpl_count=count), LEVEL_FRAMES)
+            for count in COUNTS
         )
         return measured / sum(costs.milliseconds(choice, count) for count in COUNTS)
 

@@ -24,7 +24,7 @@ from tuner.reference.cache import cache_folder
 
 POINTS = 6
 DENSEST = 512
-"""VPLs of the default frame, whose time the front goes up to: beyond, more of them hardly change the error."""
+"""VPLs of the default frame, whose time the front goes up to: more of them hardly change the error."""
 TURNS, FRAMES_A_TURN = 3, 3
 """Points are timed in turns, so that a machine that is busier for a while is so for all of them."""
 

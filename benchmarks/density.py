@@ -9,7 +9,7 @@ scene, at `FITTED_COUNT` VPLs, the falloff at every count. Curves go to out/dens
 import json
 import statistics
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -27,7 +27,14 @@ from renderer.tuned_config import TunedConfig
 from renderer.view_placement import resolve_camera_and_lights
 from renderer.views import View
 from tuner.captured_view import CapturedView
-from tuner.fit_density import RELAXATION, fit_density, rotated_views, rotation_errors, table_rotations
+from tuner.fit_density import (
+    RELAXATION,
+    fit_density,
+    rotated_views,
+    rotation_errors,
+    table_rotations,
+    with_cells,
+)
 from tuner.fit_falloff import fit_falloff
 from tuner.prepare_scene import PreparedScene, SceneOptions, Stopwatch, prepare_scene
 
@@ -60,10 +67,12 @@ COST_PASSES = (
 )
 SLOPE_STEPS = 20
 """Along η, at each of which the sign of the measured slope is compared with the smooth trend's."""
+RELAXATIONS = (1, 4, 16)
+"""Steps to measure beside those that fits take."""
 _UNFITTED = {
     "uniform": ArtistParameters(density_exponent=0.0),
     "default": ArtistParameters(),
-    "cells": ArtistParameters(density_relaxation=RELAXATION),
+    "cells": with_cells(ArtistParameters()),
 }
 VARIANTS = (*_UNFITTED, "fitted")
 
@@ -94,6 +103,7 @@ def rows(progress: Progress) -> list[Row]:
     curves = [measured_curves(name, present[name], progress) for name in names]
     write_curves(REPOSITORY / "out" / "density", curves)
     made = [*curve_rows(curves), *cost_rows(present[names[0]], progress)]
+    made += relaxation_rows(names, present, progress)
     return [*made, slope_row(names[0], present[names[0]], progress)]
 
 
@@ -183,7 +193,7 @@ def cost_rows(path: Path, progress: Progress) -> list[Row]:
     scene = read_scene(path)
     camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
     view = View("cost", "fitted", COST_SIZE, camera, lights)
-    cells = ArtistParameters(density_relaxation=RELAXATION)
+    cells = with_cells(ArtistParameters())
     drawn = {
         "32": (replace(cells, vpl_count=FITTED_COUNT), 1),
         **{f"32_a_pixel_{s}x{s}": (replace(cells, vpl_count=FITTED_COUNT * s**2), s) for s in INTERLEAVES},
@@ -208,6 +218,23 @@ def cost_rows(path: Path, progress: Progress) -> list[Row]:
     against = f"default at {DEFAULT_COUNT} VPLs, {COST_SIZE[0]}x{COST_SIZE[1]}"
     default = best.pop("default")
     return [Row(f"cost_{name}", taken, "ms", against, default) for name, taken in best.items()]
+
+
+def relaxation_rows(names: Sequence[str], present: Mapping[str, Path], progress: Progress) -> list[Row]:
+    """Unfitted cells after more and fewer steps, in the geometric mean over scenes."""
+    logs: dict[int, list[float]] = {steps: [] for steps in (RELAXATION, *RELAXATIONS)}
+    for name in names:
+        progress(f"{name}: relaxation", 0.0)
+        prepared = _prepared(present[name])
+        for steps, found in logs.items():
+            cells = replace(with_cells(ArtistParameters(vpl_count=FITTED_COUNT)), density_relaxation=steps)
+            found.append(np.log(_error(prepared.runtime, prepared.views, cells)))
+    error = {steps: float(np.exp(np.mean(found))) for steps, found in logs.items()}
+    against = f"after {RELAXATION} steps, {FITTED_COUNT} cells"
+    return [
+        Row(f"relaxation_{steps}", error[steps], "relMSE", against, error[RELAXATION])
+        for steps in RELAXATIONS
+    ]
 
 
 def count_for_error(curve: Curve, error: float) -> float:
@@ -291,7 +318,7 @@ def _main(names: Sequence[str]) -> None:
 
     curves = [measured_curves(name, present_scenes()[name], progress) for name in names]
     write_curves(REPOSITORY / "out" / "density" / "-".join(names), curves)
-    for row in curve_rows(curves):
+    for row in (*curve_rows(curves), *relaxation_rows(names, present_scenes(), progress)):
         print(f"{row.name:45s} {row.value:10.4g} {row.against_value:10.4g} {row.ratio:8.3f}  {row.against}")
 
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from benchmarks.row import Row
 from benchmarks.scene_library import REPOSITORY
-from tuner.binned_gather import bin_vpls, gather_binned
 from tuner.losses.relative_squared_error import target_of, weighted_squared_error
 from tuner.reduced_gather import ReducedGather, reduce_gather, reduced_picture
+from tuner.tabulated_gather import gather_tabulated, tabulate_gather
 from tuner.virtual_point_lights import Receivers, VirtualPointLights
 from tuner.vpl_gather import FalloffParameters, gather_pairwise
 
@@ -30,7 +30,7 @@ REPEATS = 20
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
     """`fit_cold_s`, `fit_warm_s`: the whole command, Python's start included. `step_vs_pairwise`: one value
-    and gradient of the loss for 16,384 receivers and 1,024 VPLs, binned and reduced against pair by pair."""
+    and gradient of the loss for 16,384 receivers and 1,024 VPLs, tabulated and reduced against by pairs."""
     progress("fit", 0.0)
     with tempfile.TemporaryDirectory() as folder:
         cold = _fit_seconds(Path(folder))
@@ -64,8 +64,8 @@ def _step_milliseconds() -> tuple[float, float]:
     """Median milliseconds of one value and gradient, reduced and pairwise, taken in turn."""
     receivers, vpls = corner(np.random.default_rng(0), RECEIVERS, VPLS)
     start = FalloffParameters(*map(jnp.float32, (1.0, 0.5, 0.1)))
-    binned = bin_vpls(receivers, vpls)
-    truth = np.asarray(gather_binned(binned, FalloffParameters(*map(jnp.float32, (0.8, 1.0, 0.3)))))
+    table = tabulate_gather(receivers, vpls)
+    truth = np.asarray(gather_tabulated(table, FalloffParameters(*map(jnp.float32, (0.8, 1.0, 0.3)))))
     target = target_of(truth, truth)
 
     def reduced_loss(parameters: FalloffParameters, reduced: ReducedGather) -> jax.Array:
@@ -75,7 +75,7 @@ def _step_milliseconds() -> tuple[float, float]:
         return weighted_squared_error(gather_pairwise(*pair, parameters), target)
 
     steps = {
-        "reduced": (jax.jit(jax.value_and_grad(reduced_loss)), reduce_gather(binned, target)),
+        "reduced": (jax.jit(jax.value_and_grad(reduced_loss)), reduce_gather(table, target)),
         "pairwise": (jax.jit(jax.value_and_grad(pairwise_loss)), (receivers, vpls)),
     }
     times: dict[str, list[float]] = {name: [] for name in steps}

@@ -55,7 +55,7 @@ from renderer.capture import CapturedFrame
 from renderer.strict_json import strict_json
 from renderer.tuned_config import TunedConfig
 from tuner.captured_view import CapturedView
-from tuner.fit_density import RELAXATION, Rotation, fit_density, rotated_views, table_rotations
+from tuner.fit_density import Rotation, fit_density, rotated_views, table_rotations, with_cells
 from tuner.prepare_scene import SceneOptions, Stopwatch, prepare_scene
 
 SIZE = (64, 48)
@@ -152,7 +152,7 @@ class _Problem:
 
 
 def _problem(path: Path) -> _Problem:
-    base = ArtistParameters(vpl_count=VPLS, density_relaxation=RELAXATION)
+    base = with_cells(ArtistParameters(vpl_count=VPLS))
     config = TunedConfig(base, visibility="maps")
     options = SceneOptions(size=SIZE, views=VIEWS)
     prepared = prepare_scene(path, options, config, Stopwatch(), lambda stage, share: None)

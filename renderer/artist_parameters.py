@@ -98,7 +98,7 @@ ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
         high=20.0,
         scale="log",
         unit="VPL footprints",
-        meaning="softens 1/d² near a VPL, as 1/(d² + (αℓ)²); 1 is exact facing a disc",
+        meaning="softens 1/d² near a point, as 1/(d² + (αℓ)²); of a cell's disc the radius, 1 its own",
         fitted=True,
     ),
     ParameterSpec(
@@ -176,7 +176,10 @@ ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
         high=16,
         scale="linear",
         unit="steps",
-        meaning="0 draws VPLs as points; else each has the light of a cell, and moves so often to its middle",
+        meaning=(
+            "0 draws VPLs as points; else each is a disc with the light of a cell, and moves so often to its "
+            "middle; more than 4,096 VPLs are always points"
+        ),
         fitted=False,
         whole_number=True,
     ),

@@ -48,6 +48,8 @@ class CapturedFrame:
     """Radius of the disc that the VPL stands for."""
     vpl_flux: Float32[np.ndarray, "vpls 3"]
     """Reflected radiant flux [W]."""
+    vpls_are_cells: bool
+    """Whether they shine as discs, and not as points."""
     visibility_maps: VisibilityMaps | None
     """None where the config asks for none."""
     scene_length: float
@@ -78,6 +80,7 @@ def capture_frame(frame: Frame, view: View) -> CapturedFrame:
         vpl_normal_world=vpls[:, 4:7],
         vpl_footprint=vpls[:, 3],
         vpl_flux=vpls[:, 8:11],
+        vpls_are_cells=frame.vpls_are_cells,
         visibility_maps=_visibility_maps(frame),
         scene_length=float(statistics[2]),
     )

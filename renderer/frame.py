@@ -101,6 +101,8 @@ class Frame:
         self._scene_statistics: SceneStatisticsPass | None = None
         if auto_parameters is not None:
             self._scene_statistics = SceneStatisticsPass(context, self._visibility)
+        self.vpls_are_cells = False
+        """Of the frame drawn last; else they are points."""
         interleave = options.interleave_for(vpl_count)
         self._vpl_gather = VplGatherPass(context, interleave, self._visibility)
         self._interleaved_filter: InterleavedFilterPass | None = None
@@ -144,7 +146,8 @@ class Frame:
         self._set_auto_parameters(camera)
         self._gather(camera)
         self.indirect_irradiance = self.vpl_irradiance
-        if parameters.screen_space_strength > 0.0:
+        # Discs withhold nothing that a near field would have to give back.
+        if parameters.screen_space_strength > 0.0 and not self.vpls_are_cells:
             self._add_near_field(camera, len(view.lights), accumulated)
             self.indirect_irradiance = self.near_field_irradiance
 
@@ -181,7 +184,8 @@ class Frame:
         self, records: LightRecords, table_rotation: tuple[float, float], relaxation: int
     ) -> None:
         vpls = self.virtual_point_lights
-        if relaxation == 0 or vpls.count > LARGEST_COUNT:
+        self.vpls_are_cells = relaxation > 0 and vpls.count <= LARGEST_COUNT
+        if not self.vpls_are_cells:
             vpls.draw(self.rsm, records.moment_origin, table_rotation)
             return
         if self._vpl_cells is None:
@@ -202,12 +206,12 @@ class Frame:
             self._auto_parameters.draw()
 
     def _gather(self, camera: CameraUniforms) -> None:
-        count, picture = self.virtual_point_lights.count, self.vpl_irradiance
+        count, picture, cells = self.virtual_point_lights.count, self.vpl_irradiance, self.vpls_are_cells
         if self._interleaved_filter is None:
-            self._vpl_gather.draw(camera, self.gbuffer, count, picture)
+            self._vpl_gather.draw(camera, self.gbuffer, count, picture, cells=cells)
             return
         self._vpl_gather.draw(
-            camera, self.gbuffer, count, self._interleaved_irradiance, self._interleaved_direction
+            camera, self.gbuffer, count, self._interleaved_irradiance, self._interleaved_direction, cells
         )
         self._interleaved_filter.draw(
             camera,
@@ -217,7 +221,7 @@ class Frame:
             direction=self._interleaved_direction,
             pixel_list=self._pixel_list,
         )
-        self._vpl_gather.refine(camera, self.gbuffer, count, self._pixel_list, picture)
+        self._vpl_gather.refine(camera, self.gbuffer, count, self._pixel_list, picture, cells)
 
     def _add_near_field(
         self, camera: CameraUniforms, light_count: int, accumulated: LightAccumulation | None

@@ -113,7 +113,7 @@ def left_out(config: TunedConfig) -> tuple[str, ...]:
     if config.parameters.density_importance > 0.0:
         sentences.append("Outside the runtime VPLs are placed by flux alone: the same mean, more noise")
     if config.parameters.density_relaxation > 0:
-        sentences.append("Outside the runtime VPLs are points, not cells: the same mean, more noise")
+        sentences.append("Outside the runtime VPLs are points, not discs: another falloff, and more noise")
     return tuple(sentences)
 
 

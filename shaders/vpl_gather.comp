@@ -4,6 +4,7 @@
 // of its pixels read the same VPLs (Segovia et al. 2006, done here by arithmetic on the pixel's index).
 // With it goes the direction that the light comes from, so that the filter can tell what a pixel's share would
 // be on its neighbours' normals.
+// With VPL_CELLS, VPLs shine as discs, and else as points.
 // With LISTED_PIXELS, the pixels are those of the list, for which sharing did not do.
 #include "common/artist_parameters.glsl"
 #include "common/gbuffer.glsl"
@@ -12,6 +13,9 @@
 
 const float PI = 3.14159265358979;
 #include "common/vpl_irradiance.glsl"
+#if VPL_CELLS
+#include "common/vpl_disc.glsl"
+#endif
 #include "common/pixel_list.glsl"
 #if VISIBILITY_MAP_SIZE > 0
 #include "common/vpl_visibility.glsl"
@@ -67,21 +71,26 @@ void main() {
         for (int i = 0; i < count; ++i) {
             VirtualPointLight vpl = batch[i];
             vec3 to_vpl = vpl.position_footprint.xyz - receiver.position_world;
-            float cosine = max(dot(receiver.normal_world, to_vpl), 0.0);
-            float falloff = vpl_falloff(to_vpl, vpl, scene_length, parameters);
-#if VISIBILITY_MAP_SIZE > 0
-            // About half of all pairs face away from each other, and need no look at the map.
-            if (cosine * falloff > 0.0) {
-                falloff *= vpl_visibility(
-                    receiver.position_world, receiver.normal_world, vpl,
-                    (start + i) * (VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE), scene_length, visibility);
-            }
+#if VPL_CELLS
+            vec3 arriving = cell_vector_irradiance(to_vpl, receiver.normal_world, vpl, scene_length, parameters);
+#else
+            vec3 arriving = to_vpl * vpl_falloff(to_vpl, vpl, scene_length, parameters);
 #endif
-            irradiance += vpl.flux.rgb * (cosine * falloff);
-#if INTERLEAVE > 1
-            if (cosine > 0.0) {
-                vector_irradiance += to_vpl * (dot(vpl.flux.rgb, vec3(1.0)) * falloff);
+            float received = dot(receiver.normal_world, arriving);
+            // About half of all pairs face away from each other, and need no look at the map.
+            if (!(received > 0.0)) {
+                continue;
             }
+#if VISIBILITY_MAP_SIZE > 0
+            float seen = vpl_visibility(
+                receiver.position_world, receiver.normal_world, vpl,
+                (start + i) * (VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE), scene_length, visibility);
+            received *= seen;
+            arriving *= seen;
+#endif
+            irradiance += vpl.flux.rgb * received;
+#if INTERLEAVE > 1
+            vector_irradiance += arriving * dot(vpl.flux.rgb, vec3(1.0));
 #endif
         }
         barrier();

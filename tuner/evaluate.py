@@ -15,10 +15,10 @@ from jaxtyping import Bool, Float32
 from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
 from renderer.scene import Scene
-from tuner.binned_gather import Visibility
 from tuner.captured_view import CapturedView, runtime_irradiance
 from tuner.fit_falloff import fit_falloff
 from tuner.reference import noise_floor, ray_traced_visibility
+from tuner.tabulated_gather import Visibility
 from tuner.view_metrics import ViewMetrics, mean_metrics, view_metrics
 from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_gather import FalloffParameters, gather

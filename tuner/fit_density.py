@@ -41,9 +41,10 @@ HELD_OUT_ROTATIONS = 8
 FEW_VPLS = 256
 """Up to this many, the fit sees several rotations and the density is fitted; beyond, one placement is as good
 as any other."""
-RELAXATION = 4
-"""Steps towards the middles of cells: in three rooms, 32 VPLs have 0.9 of the error after 4 that they have
-after 1, and 0.97 of that after 8."""
+RELAXATION = 8
+"""Steps towards the middles of cells (rows `relaxation_…` of `vpltune bench density`)."""
+CELL_FOOTPRINT = 1.0
+"""α where a fit of cells begins: discs as wide as their cells. Points do best at about half of that."""
 _IMPORTANCES = (0.0, 0.5, 1.0)
 """Of η, at γ = 1; more where their parabola is least, in steps of a tenth."""
 _EXPONENTS = (0.75, 0.5, 0.25, 0.0)
@@ -226,8 +227,17 @@ def density_document(
     }
 
 
+def with_cells(parameters: ArtistParameters) -> ArtistParameters:
+    """Cells in place of points, each a disc of its own size; parameters that have cells are as they were."""
+    if parameters.density_relaxation > 0:
+        return parameters
+    return replace(parameters, density_relaxation=RELAXATION, falloff_footprint=CELL_FOOTPRINT)
+
+
 def _with(parameters: ArtistParameters, density: Density) -> ArtistParameters:
     exponent, importance, relaxation = density
+    if relaxation > 0:
+        parameters = with_cells(parameters)
     return replace(
         parameters,
         density_exponent=exponent,

@@ -1,4 +1,4 @@
-"""Fits intensity and falloff to captured views: binned gather, relative error and fit put together.
+"""Fits intensity and falloff to captured views: tabulated gather, relative error and fit put together.
 
 The picture is linear in the intensity k, so at every point of the other parameters the best k has a closed
 form, and the fit moves over the others alone (variable projection, Golub and Pereyra 1973).

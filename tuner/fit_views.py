@@ -1,4 +1,4 @@
-"""A view as the fit works on it: VPLs binned, and the reference at the chosen receivers."""
+"""A view as the fit works on it: the gather tabulated, and the reference at the chosen receivers."""
 
 from dataclasses import dataclass
 
@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Array, Bool, Float32, Int
 
 from renderer.artist_parameters import ArtistParameters
-from tuner.binned_gather import BinnedGather, Visibility, bin_vpls
 from tuner.captured_view import CapturedView
 from tuner.losses.relative_squared_error import EVEN_SHARE, Target, target_of
 from tuner.reduced_gather import ReducedGather, reduce_gather
+from tuner.tabulated_gather import TabulatedGather, Visibility, tabulate_gather
 from tuner.virtual_point_lights import Receivers, VirtualPointLights, gather_inputs
 from tuner.vpl_visibility import map_visibility
 
@@ -26,7 +26,7 @@ TILES = 2
 class FitView:
     """One view, ready to be fitted."""
 
-    binned: BinnedGather
+    table: TabulatedGather
     target: Target
     reduced: ReducedGather
     tile: Int[Array, " receivers"]
@@ -52,11 +52,11 @@ def fit_view(
         pixels: where the receivers lie in the picture, counted row by row.
         size: width and height of the picture.
     """
-    binned = bin_vpls(receivers, vpls, visibility)
+    table = tabulate_gather(receivers, vpls, visibility)
     target = target_of(half_a, half_b, even_share)
     row, column = np.divmod(pixels, size[0])
     tile = (row * TILES // size[1]) * TILES + column * TILES // size[0]
-    return FitView(binned, target, reduce_gather(binned, target), jnp.asarray(tile, jnp.int32))
+    return FitView(table, target, reduce_gather(table, target), jnp.asarray(tile, jnp.int32))
 
 
 def fit_view_of(

@@ -27,7 +27,7 @@ from tuner.losses.relative_squared_error import EVEN_SHARE, target_of
 from tuner.reduced_gather import reduce_columns
 from tuner.search_space import VISIBILITY_SPECS, SearchSpace
 from tuner.virtual_point_lights import Receivers, VirtualPointLights, gather_inputs
-from tuner.vpl_gather import FalloffParameters, pair_geometry
+from tuner.vpl_gather import FalloffParameters, pair_forms
 from tuner.vpl_visibility import VisibilityParameters, map_texels, seen_share, surface_overlap
 
 TURNS = 2
@@ -213,10 +213,9 @@ def _sums(
     falloff: FalloffParameters,
 ) -> Float[Array, "receivers 3 columns"]:
     """What is always seen, then what is shared out between the nodes, linearly in the logarithm."""
-    squared, cosines = pair_geometry(receivers, vpls)
-    footprint = falloff.falloff_footprint * vpls.footprint
+    squared, form_at = pair_forms(receivers, vpls)
     transmittance = jnp.exp(-falloff.falloff_transmittance * jnp.sqrt(squared))
-    form = falloff.intensity / jnp.pi * cosines / (squared + footprint**2) * transmittance
+    form = falloff.intensity / jnp.pi * form_at(falloff.falloff_footprint) * transmittance
     step = np.log(_MOST / _LEAST) / (NODES - 1)
     place = jnp.log(jnp.maximum(overlap, _LEAST) / _LEAST) / step
 

@@ -27,13 +27,13 @@ from tuner.cost_model import (
 from tuner.fit_density import (
     FEW_VPLS,
     HELD_OUT_ROTATIONS,
-    RELAXATION,
     ROTATIONS,
     DensityFit,
     fit_density,
     rotated_views,
     rotation_errors,
     table_rotations,
+    with_cells,
 )
 from tuner.fit_falloff import fit_falloff
 from tuner.fit_status import Descent
@@ -123,9 +123,7 @@ class FrameBudget:
         # A view that no light reaches says nothing of errors, and takes its time all the same.
         self._views = tuple(view for view in fitted if view.lit)
         self._timed = tuple(replace(view.view, size=frame_size) for view in fitted)
-        guessed = replace(
-            start.parameters, density_importance=GUESSED_IMPORTANCE, density_relaxation=RELAXATION
-        )
+        guessed = replace(with_cells(start.parameters), density_importance=GUESSED_IMPORTANCE)
         self._start = replace(start, parameters=guessed)
         self._runtimes: dict[FrameChoice, Runtime] = {}
         self.default_choice = default_choice(self._timed[0])

@@ -1,12 +1,12 @@
-"""A view's whole fit as a small least-squares problem: as many rows as the binned gather has nodes.
+"""A view's whole fit as a small least-squares problem: as many rows as the tabulated gather has nodes.
 
-With B the binned gather of all receivers and channels, f the falloff at its nodes, k the intensity and
+With B the tabulated gather of all receivers and channels, f the weights of its nodes, k the intensity and
 m = (a + b)/2 the mean of the reference's halves, the loss of a view is
 
     Σ w (kBf − a)(kBf − b) = |√w (kBf − m)|² − Σ w (a − b)²/4
 
 The first term depends on B, w and m only through G = [B m]ᵀ w [B m]. Any R with RᵀR = G gives the same
-residuals up to a rotation, R [kf, −1], so a step of the fit costs a product with a matrix of some 193 rows
+residuals up to a rotation, R [kf, −1], so a step of the fit costs a product with a matrix of some 105 rows
 instead of 12,288, whatever the numbers of receivers and VPLs are.
 """
 
@@ -18,8 +18,8 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.linalg.lapack import dpstrf
 
-from tuner.binned_gather import BinnedGather, node_falloff
 from tuner.losses.relative_squared_error import Target
+from tuner.tabulated_gather import TabulatedGather, node_weights
 from tuner.vpl_gather import FalloffParameters
 
 ROWS_AT_ONCE = 1024
@@ -37,13 +37,11 @@ class ReducedGather:
     target: Float[Array, " rows"]
     offset: Float[Array, ""]
     """−Σ w (a − b)²/4: what the reference's noise adds to the square of the residuals."""
-    distance: Float[Array, " distances"]
-    footprint: Float[Array, " footprints"]
 
 
-def reduce_gather(binned: BinnedGather, target: Target) -> ReducedGather:
+def reduce_gather(table: TabulatedGather, target: Target) -> ReducedGather:
     """The small problem of one view; done once for each placement of the VPLs."""
-    return ReducedGather(*reduce_columns(binned.irradiance, target), binned.distance, binned.footprint)
+    return ReducedGather(*reduce_columns(table.irradiance, target))
 
 
 def reduce_columns(
@@ -63,8 +61,8 @@ def reduce_columns(
 
 def reduced_picture(reduced: ReducedGather, parameters: FalloffParameters) -> Float[Array, " rows"]:
     """The weighted picture, rotated into the small problem's rows."""
-    falloff = node_falloff(reduced.distance, reduced.footprint, parameters)
-    return parameters.intensity * jnp.matmul(reduced.factor, falloff, precision=jax.lax.Precision.HIGHEST)
+    weights = node_weights(parameters)
+    return parameters.intensity * jnp.matmul(reduced.factor, weights, precision=jax.lax.Precision.HIGHEST)
 
 
 @jax.jit

@@ -25,12 +25,12 @@ from jaxtyping import Array, Float
 from scipy.special import stdtrit
 
 from renderer.artist_parameters import ArtistParameters
-from tuner.binned_gather import gather_binned
 from tuner.descent import profile
 from tuner.fit_falloff import all_residuals, fit_to
 from tuner.fit_status import Descent
 from tuner.fit_views import TILES, FitView
 from tuner.search_space import SearchSpace
+from tuner.tabulated_gather import gather_tabulated
 from tuner.vpl_gather import FalloffParameters
 
 CONFIDENCE = 0.9
@@ -205,7 +205,7 @@ def _view_tiles(
     root, mean = jnp.sqrt(target.weight), (target.half_a + target.half_b) / 2.0
 
     def residuals(at: Array) -> tuple[Array, Array]:
-        values = root * (gather_binned(view.binned, FalloffParameters(**space.values(at))) - mean)
+        values = root * (gather_tabulated(view.table, FalloffParameters(**space.values(at))) - mean)
         return values, values
 
     jacobian, values = jax.jacfwd(residuals, has_aux=True)(point)

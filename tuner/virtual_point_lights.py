@@ -1,6 +1,6 @@
 """Receivers and VPLs of one view as JAX arrays without world units."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import jax
 import jax.numpy as jnp
@@ -29,6 +29,8 @@ class VirtualPointLights:
     footprint: Float[Array, "*vpls"]
     """Radius in units of L."""
     flux: Float[Array, "*vpls 3"]
+    cells: bool = field(default=False, metadata={"static": True})
+    """Whether they shine as discs, and not as points."""
 
 
 def gather_inputs(
@@ -62,5 +64,6 @@ def gather_inputs(
             jnp.asarray(captured.vpl_normal_world, jnp.float32),
             jnp.asarray(captured.vpl_footprint / length, jnp.float32),
             jnp.asarray(captured.vpl_flux.astype(np.float64) / length**2, jnp.float32),
+            captured.vpls_are_cells,
         ),
     )

@@ -1,9 +1,10 @@
 """The VPL gather in JAX: the twin of shaders/vpl_gather.comp and shaders/common/vpl_irradiance.glsl.
 
-Keller 1997 (instant radiosity), with the point spread over its footprint: 1/d² becomes
-1/(d² + (αl)²), which for α = 1 is the exact form factor of a coaxial disc.
+Points: Keller 1997 (instant radiosity), with the point spread over its footprint: 1/d² becomes
+1/(d² + (αl)²), which for α = 1 is the exact form factor of a coaxial disc. Cells: `tuner.vpl_disc`.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -12,10 +13,14 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from renderer.artist_parameters import ArtistParameters
+from renderer.vpl_disc_bounds import LEAST_RADIUS
 from tuner.virtual_point_lights import Receivers, VirtualPointLights
+from tuner.vpl_disc import disc_form
 
 PAIRS_AT_ONCE = 2**19
 """Receivers times VPLs in one go: 2 MiB an array, which stays in a core's cache, for any number of VPLs."""
+
+Pairs = Float[Array, "receivers vpls"]
 
 
 @jax.tree_util.register_dataclass
@@ -45,13 +50,16 @@ def vpl_irradiance(
 ) -> Float[Array, "3"]:
     """Irradiance of one VPL at one receiver, lengths in units of L. Twin: `vpl_irradiance` in GLSL."""
     to_vpl = vpl.position - position
-    # As in `pair_geometry`.
-    distance_squared = jnp.maximum(jnp.dot(to_vpl, to_vpl), 1e-18)
-    cosine_receiver = jnp.maximum(jnp.dot(normal, to_vpl), 0.0)
-    cosine_vpl = jnp.maximum(-jnp.dot(vpl.normal, to_vpl), 0.0)
+    # As in `pair_forms`.
+    squared = jnp.maximum(jnp.dot(to_vpl, to_vpl), 1e-18)
+    facing, height = jnp.dot(normal, to_vpl), -jnp.dot(vpl.normal, to_vpl)
     footprint = parameters.falloff_footprint * vpl.footprint
-    form = cosine_receiver * cosine_vpl / distance_squared / (distance_squared + footprint**2)
-    transmittance = jnp.exp(-parameters.falloff_transmittance * jnp.sqrt(distance_squared))
+    if vpl.cells:
+        between = jnp.dot(normal, vpl.normal)
+        form = disc_form(squared, facing, height, between, jnp.maximum(footprint, LEAST_RADIUS))
+    else:
+        form = jnp.maximum(facing, 0.0) * jnp.maximum(height, 0.0) / squared / (squared + footprint**2)
+    transmittance = jnp.exp(-parameters.falloff_transmittance * jnp.sqrt(squared))
     return vpl.flux * (parameters.intensity / jnp.pi * form * transmittance)
 
 
@@ -67,25 +75,33 @@ def gather_pairwise(
     return jax.vmap(at)(receivers.position, receivers.normal)
 
 
-def pair_geometry(
-    receivers: Receivers, vpls: VirtualPointLights
-) -> tuple[Float[Array, "receivers vpls"], Float[Array, "receivers vpls"]]:
-    """Squared distance and the product of both cosines for every pair.
+def pair_forms(receivers: Receivers, vpls: VirtualPointLights) -> tuple[Pairs, Callable[[Array], Pairs]]:
+    """Squared distances, and what gives each pair's irradiance, in units of Φ/π, for an α.
 
     Written axis by axis, so that XLA fuses it all into one loop and no array of [receivers, vpls, 3] is made.
     That is as fast as |x|² + |v|² − 2 x·v from a matrix product, whose three axes are too few to gain by, and
     does not cancel: near contacts the matrix form lost three digits (1e-6 became 2e-3 relative RMSE).
     """
-    squared = towards_vpl = towards_receiver = jnp.zeros(())
+    squared = facing = height = between = jnp.zeros(())
     for axis in range(3):
         to_vpl = vpls.position[None, :, axis] - receivers.position[:, None, axis]
+        normal, vpl_normal = receivers.normal[:, None, axis], vpls.normal[None, :, axis]
         squared = squared + to_vpl**2
-        towards_vpl = towards_vpl + receivers.normal[:, None, axis] * to_vpl
-        towards_receiver = towards_receiver - vpls.normal[None, :, axis] * to_vpl
+        facing = facing + normal * to_vpl
+        height = height - vpl_normal * to_vpl
+        between = between + normal * vpl_normal
     # Keeps quotients finite where receiver and VPL coincide; both cosines are 0 there. 1e-18 and not less:
     # XLA may turn x/y/y into x/(y·y), and that square must still be a float32.
     squared = jnp.maximum(squared, 1e-18)
-    return squared, jnp.maximum(towards_vpl, 0.0) * jnp.maximum(towards_receiver, 0.0) / squared
+    if vpls.cells:
+
+        def disc(falloff_footprint: Array) -> Pairs:
+            radius = jnp.maximum(falloff_footprint * vpls.footprint, LEAST_RADIUS)
+            return disc_form(squared, facing, height, between, radius)
+
+        return squared, disc
+    cosines = jnp.maximum(facing, 0.0) * jnp.maximum(height, 0.0) / squared
+    return squared, lambda falloff_footprint: cosines / (squared + (falloff_footprint * vpls.footprint) ** 2)
 
 
 def receivers_at_once(vpls: int, pairs: int) -> int:
@@ -119,10 +135,9 @@ def gather(
     @partial(jax.checkpoint, prevent_cse=False)
     def gather_chunk(chunk: tuple[Array, Array, Array | None]) -> Array:
         position, normal, visible = chunk
-        squared, cosines = pair_geometry(Receivers(position, normal), vpls)
-        footprint = parameters.falloff_footprint * vpls.footprint
+        squared, form = pair_forms(Receivers(position, normal), vpls)
         transmittance = jnp.exp(-parameters.falloff_transmittance * jnp.sqrt(squared))
-        weight = cosines / (squared + footprint**2) * transmittance
+        weight = form(parameters.falloff_footprint) * transmittance
         if visible is not None:
             weight = weight * visible
         return jnp.matmul(weight, vpls.flux, precision=jax.lax.Precision.HIGHEST)

@@ -23,9 +23,8 @@ class VplCellsPass:
     """Samples of the RSM, VPLs → the VPLs, each with the light of the samples that are nearest to it.
 
     Some steps of Lloyd (1982), as Dong et al. 2009 ("Interactive indirect illumination using clustered
-    visibility") make virtual area lights from RSMs. What is wrong with a picture of 32 points is almost all
-    their form: with the form factors of whole cells, each seen or not as its middle is, a twentieth of the
-    squared error was left in four scenes. A point in the middle of each cell, as here, leaves a third.
+    visibility") make virtual area lights from RSMs. What is wrong with a picture of 32 points is most of all
+    their form; a cell shines as a disc of its spread (`shaders/common/vpl_disc.glsl`).
     """
 
     def __init__(self, context: moderngl.Context, vpl_count: int):

@@ -2,7 +2,7 @@
 
 import moderngl
 
-from renderer import buffer_bindings
+from renderer import buffer_bindings, vpl_disc_bounds
 from renderer.camera_uniforms import CameraUniforms
 from renderer.render_targets import GBuffer, PixelList
 from renderer.shader_library import load_compute, set_uniforms
@@ -23,8 +23,7 @@ class VplGatherPass:
         self._context = context
         self._visibility = visibility
         self._interleave = interleave
-        self._program = self._load(interleave, listed_pixels=False)
-        self._listed_program = self._load(1, listed_pixels=True) if interleave > 1 else None
+        self._programs: dict[tuple[bool, bool], moderngl.ComputeShader] = {}
 
     def draw(
         self,
@@ -33,17 +32,20 @@ class VplGatherPass:
         vpl_count: int,
         irradiance: moderngl.Texture,
         direction: moderngl.Texture | None = None,
+        cells: bool = False,
     ) -> None:
         """Gather from the VPLs, with the parameters, that are bound.
 
-        `direction` takes where the light comes from, in an interleaved picture.
+        `direction` takes where the light comes from, in an interleaved picture. `cells`: VPLs are cells of
+        light, which shine as discs, and not points.
         """
-        self._bind(self._program, camera, gbuffer, vpl_count, irradiance)
+        program = self._program(cells, listed_pixels=False)
+        self._bind(program, camera, gbuffer, vpl_count, irradiance)
         if direction is not None:
             direction.bind_to_image(1, read=False, write=True)
         side = 8 * self._interleave
         groups = (-(-irradiance.width // side), -(-irradiance.height // side))
-        self._program.run(*groups, self._interleave**2)
+        program.run(*groups, self._interleave**2)
         self._context.memory_barrier(self._context.TEXTURE_FETCH_BARRIER_BIT)
 
     def refine(
@@ -53,22 +55,29 @@ class VplGatherPass:
         vpl_count: int,
         pixel_list: PixelList,
         irradiance: moderngl.Texture,
+        cells: bool = False,
     ) -> None:
         """Gather in full at the listed pixels of an interleaved picture, and leave the others as they are."""
-        assert self._listed_program is not None, "a full gather has nothing to refine"
-        self._bind(self._listed_program, camera, gbuffer, vpl_count, irradiance)
+        assert self._interleave > 1, "a full gather has nothing to refine"
+        program = self._program(cells, listed_pixels=True)
+        self._bind(program, camera, gbuffer, vpl_count, irradiance)
         pixel_list.bind()
-        self._listed_program.run_indirect(pixel_list.buffer)
+        program.run_indirect(pixel_list.buffer)
         self._context.memory_barrier(self._context.TEXTURE_FETCH_BARRIER_BIT)
 
-    def _load(self, interleave: int, listed_pixels: bool) -> moderngl.ComputeShader:
-        defines = {
-            **buffer_bindings.DEFINES,
-            "INTERLEAVE": interleave,
-            "LISTED_PIXELS": listed_pixels,
-            **self._visibility.defines,
-        }
-        return load_compute(self._context, "vpl_gather", defines)
+    def _program(self, cells: bool, listed_pixels: bool) -> moderngl.ComputeShader:
+        """Compiled when it is first needed: most configs need one form of VPL."""
+        if (cells, listed_pixels) not in self._programs:
+            defines = {
+                **buffer_bindings.DEFINES,
+                **vpl_disc_bounds.DEFINES,
+                "INTERLEAVE": 1 if listed_pixels else self._interleave,
+                "LISTED_PIXELS": listed_pixels,
+                "VPL_CELLS": cells,
+                **self._visibility.defines,
+            }
+            self._programs[cells, listed_pixels] = load_compute(self._context, "vpl_gather", defines)
+        return self._programs[cells, listed_pixels]
 
     def _bind(
         self,

@@ -14,10 +14,13 @@ from renderer.runtime import Runtime
 from renderer.scene import Camera, Light, look_at, scaled
 from renderer.tuned_config import TunedConfig
 from renderer.views import View, scaled_view
+from tuner.fit_density import CELL_FOOTPRINT
 
 
 def runtime_with(gl_context, scene=None, resolution=256, **parameters) -> Runtime:
-    chosen = {**ArtistParameters().as_dict(), "vpl_count": 32, "density_relaxation": 4, **parameters}
+    relaxation = parameters.get("density_relaxation", 4)
+    form = {"density_relaxation": relaxation, "falloff_footprint": CELL_FOOTPRINT if relaxation else 0.5}
+    chosen = {**ArtistParameters().as_dict(), "vpl_count": 32, **form, **parameters}
     config = TunedConfig(ArtistParameters(**chosen), visibility="none")
     return Runtime(scene or colored_room(), config, rsm_resolution=resolution, context=gl_context)
 
@@ -123,13 +126,15 @@ def test_cells_have_no_unit(gl_context, factor):
     assert np.sqrt(np.mean((grown - picture) ** 2) / np.mean(picture**2)) < 1e-3
 
 
-def test_frames_repeat_bitwise(gl_context):
-    runtime = runtime_with(gl_context, density_importance=0.7)
-    first = runtime.capture(room_view("point", (32, 24)))
-    runtime.capture(room_view("spot", (32, 24)))
-    again = runtime.capture(room_view("point", (32, 24)))
-    np.testing.assert_array_equal(again.vpl_position_world, first.vpl_position_world)
-    np.testing.assert_array_equal(again.indirect_irradiance, first.indirect_irradiance)
+def test_discs_have_no_near_field(gl_context):
+    """They withhold nothing that it could give back."""
+    pictures = [
+        runtime_with(gl_context, screen_space_strength=strength).render(
+            room_view("spot", (32, 24)), "irradiance"
+        )
+        for strength in (0.0, 2.0)
+    ]
+    np.testing.assert_array_equal(*pictures)
 
 
 def test_dark_and_very_many(gl_context):

@@ -76,8 +76,11 @@ def test_importance_has_no_unit(gl_context, factor):
     assert np.sqrt(np.mean((grown - picture) ** 2) / np.mean(picture**2)) < 1e-3
 
 
-def test_frames_repeat_bitwise(gl_context):
-    runtime = runtime_with(gl_context, vpl_count=64, density_importance=0.7)
+@pytest.mark.parametrize("density_relaxation", [0, 4])
+def test_frames_repeat_bitwise(gl_context, density_relaxation):
+    runtime = runtime_with(
+        gl_context, vpl_count=64, density_importance=0.7, density_relaxation=density_relaxation
+    )
     first = runtime.capture(room_view("point", (32, 24)))
     runtime.capture(room_view("spot", (32, 24)))
     again = runtime.capture(room_view("point", (32, 24)))

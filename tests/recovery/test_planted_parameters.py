@@ -9,12 +9,12 @@ from own_reference import own_reference
 from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
 from renderer.tuned_config import TunedConfig
-from tuner.binned_gather import bin_vpls, gather_binned
 from tuner.captured_view import CapturedView
 from tuner.fit_falloff import fit_falloff
 from tuner.fit_status import FitStatus
 from tuner.reference.reference_view import ReferenceView
 from tuner.search_space import SearchSpace
+from tuner.tabulated_gather import gather_tabulated, tabulate_gather
 from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_gather import FalloffParameters
 
@@ -39,7 +39,7 @@ def planted_views(gl_context):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_recovery_from_a_random_start(planted_views, seed):
-    """k, α and κ within 1 % from anywhere in their ranges; the binned surrogate accounts for most of that."""
+    """k, α and κ within 1 % from anywhere in their ranges; the tabulated surrogate accounts for most."""
     space = SearchSpace()
     start = space.parameters(np.random.default_rng(seed).random(3), PLANTED)
     tuned, result = fit_falloff(planted_views, start)
@@ -87,12 +87,12 @@ def test_noise_is_not_fitted(planted_views):
 
 
 def test_the_surrogate_is_what_was_planted(planted_views):
-    """The binned picture at the planted parameters is the runtime's: 0.3 % relative RMSE."""
+    """The tabulated picture at the planted parameters is the runtime's: 0.3 % relative RMSE."""
     for view in planted_views:
         receivers, vpls = gather_inputs(view.captured)
         parameters = FalloffParameters(
             *map(jnp.float32, (PLANTED.intensity, PLANTED.falloff_footprint, PLANTED.falloff_transmittance))
         )
-        picture = np.asarray(gather_binned(bin_vpls(receivers, vpls), parameters))
+        picture = np.asarray(gather_tabulated(tabulate_gather(receivers, vpls), parameters))
         truth = view.reference.irradiance_a[view.captured.valid]
         assert np.sqrt(np.mean((picture - truth) ** 2) / np.mean(truth**2)) < 3e-3

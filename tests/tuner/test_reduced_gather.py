@@ -6,9 +6,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from tuner.binned_gather import bin_vpls, gather_binned
 from tuner.losses.relative_squared_error import target_of, weighted_squared_error
 from tuner.reduced_gather import reduce_gather, reduced_picture
+from tuner.tabulated_gather import gather_tabulated, tabulate_gather
 from tuner.virtual_point_lights import Receivers, VirtualPointLights
 from tuner.vpl_gather import FalloffParameters
 
@@ -30,12 +30,12 @@ def view():
         array(random.uniform(0.05, 0.3, 40)),
         array(random.uniform(0.0, 1.0, (40, 3))),
     )
-    binned = bin_vpls(receivers, vpls)
-    picture = np.asarray(gather_binned(binned, parameters(0.9, 1.5, 0.4)))
+    table = tabulate_gather(receivers, vpls)
+    picture = np.asarray(gather_tabulated(table, parameters(0.9, 1.5, 0.4)))
     halves = [
         (picture * (1.0 + 0.2 * random.standard_normal(picture.shape))).astype(np.float32) for _ in range(2)
     ]
-    return binned, halves
+    return table, halves
 
 
 def parameters(*values):
@@ -45,19 +45,19 @@ def parameters(*values):
 @pytest.mark.parametrize("values", [(1.0, 0.5, 0.0), (0.9, 1.5, 0.4), (0.05, 20.0, 8.0), (20.0, 0.05, 0.0)])
 def test_same_loss(view, values):
     """To 2e-6 of the sum of squares of picture and target: sums of 4,500 float32 products, in two orders."""
-    binned, halves = view
+    table, halves = view
     target = target_of(*halves)
-    reduced = reduce_gather(binned, target)
+    reduced = reduce_gather(table, target)
     picture = reduced_picture(reduced, parameters(*values))
     small = float(jnp.sum((picture - reduced.target) ** 2) + reduced.offset)
-    full = float(weighted_squared_error(gather_binned(binned, parameters(*values)), target))
+    full = float(weighted_squared_error(gather_tabulated(table, parameters(*values)), target))
     size = float(jnp.sum(picture**2) + jnp.sum(reduced.target**2))
     assert small == pytest.approx(full, abs=2e-6 * size)
 
 
 def test_a_black_view_is_all_zero(view):
-    binned, halves = view
-    reduced = reduce_gather(binned, target_of(*(np.zeros_like(half) for half in halves)))
+    table, halves = view
+    reduced = reduce_gather(table, target_of(*(np.zeros_like(half) for half in halves)))
     assert not np.any(reduced.factor)
     assert not np.any(reduced.target)
     assert float(reduced.offset) == 0.0
@@ -65,6 +65,6 @@ def test_a_black_view_is_all_zero(view):
 
 def test_what_is_not_finite_stays_so(view):
     """It must not be taken for a view without light."""
-    binned, halves = view
-    broken = replace(binned, irradiance=binned.irradiance.at[7, 0, 3].set(jnp.nan))
+    table, halves = view
+    broken = replace(table, irradiance=table.irradiance.at[7, 0, 3].set(jnp.nan))
     assert np.isnan(reduce_gather(broken, target_of(*halves)).factor).any()

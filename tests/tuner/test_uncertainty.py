@@ -9,10 +9,10 @@ import pytest
 from benchmarks.calibration import rows
 from benchmarks.planted_problems import planted_problem
 from renderer.artist_parameters import ArtistParameters
-from tuner.binned_gather import gather_binned
 from tuner.commands.metrics_table import parameters_table
 from tuner.descent import profile
 from tuner.fit_views import fit_view
+from tuner.tabulated_gather import gather_tabulated
 from tuner.uncertainty import fit_with_intervals
 from tuner.virtual_point_lights import Receivers, VirtualPointLights
 from tuner.vpl_gather import FalloffParameters, gather
@@ -51,7 +51,7 @@ def floor_view(height, planted, noise=0.0, misfit=None, seed=0, footprint=0.2):
 
 
 def test_a_clean_problem_has_narrow_intervals():
-    """Noise of 2 % over 7,200 values: everything within 3 %, and the truth inside with room for binning."""
+    """Noise of 2 % over 7,200 values: everything within 3 %, and the truth inside with room for the table."""
     planted = replace(PRIOR, intensity=1.3, falloff_footprint=1.2, falloff_transmittance=0.5)
     views = tuple(floor_view(height, planted, 0.02, seed=i) for i, height in enumerate((0.15, 0.4)))
     tuned, _, found = fit_with_intervals(views, PRIOR)
@@ -97,10 +97,10 @@ def test_misfit_widens_the_intervals():
     assert widths[0] < 1.1 < widths[1]
 
 
-def test_a_binned_picture_is_in_the_view():
-    """The intervals' own picture is the fit's: the same bins, at the receivers themselves."""
+def test_a_tabulated_picture_is_in_the_view():
+    """The intervals' own picture is the fit's: the same table, at the receivers themselves."""
     view = floor_view(0.4, PRIOR)
-    picture = np.asarray(gather_binned(view.binned, FalloffParameters.of(PRIOR)))
+    picture = np.asarray(gather_tabulated(view.table, FalloffParameters.of(PRIOR)))
     np.testing.assert_allclose(picture, view.target.half_a, rtol=1e-2)
     assert sorted(set(np.asarray(view.tile).tolist())) == [0, 1, 2, 3]
 

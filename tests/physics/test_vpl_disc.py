@@ -1,0 +1,129 @@
+"""A disc of light against its closed forms, and against the sum of its parts."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from renderer.vpl_disc_bounds import FADE_HEIGHT, LEAST_RADIUS
+from tuner.vpl_disc import disc_form, disc_past_chord
+
+RINGS, SECTORS = 100, 200
+
+
+def form(receiver, normal, radius):
+    """`disc_form` of a disc around the origin, facing +Z."""
+    receiver, normal = np.asarray(receiver, float), np.asarray(normal, float)
+    lengths = ((receiver**2).sum(-1), -(receiver * normal).sum(-1), receiver[..., 2], normal[..., 2], radius)
+    return np.asarray(disc_form(*(jnp.asarray(value, jnp.float32) for value in lengths)))
+
+
+def integral(receiver, normal, radius):
+    """The same by summing small pieces of the disc, each where it is over the receiver's horizon."""
+    r = np.sqrt((np.arange(RINGS) + 0.5) / RINGS) * radius
+    angle = (np.arange(SECTORS) + 0.5) / SECTORS * 2.0 * np.pi
+    piece = np.stack([np.outer(r, np.cos(angle)), np.outer(r, np.sin(angle)), np.zeros((RINGS, SECTORS))], -1)
+    to_piece = piece - receiver
+    squared = (to_piece**2).sum(-1)
+    cosines = np.maximum(to_piece @ normal, 0.0) * np.maximum(-to_piece[..., 2], 0.0)
+    return (cosines / squared**2).mean()
+
+
+def random_receivers(count, seed, reach=3.0):
+    """Above the disc's plane, from 0.05 to `reach` of its radius away; normals at random."""
+    random = np.random.default_rng(seed)
+    direction = random.standard_normal((count, 3))
+    direction[:, 2] = np.abs(direction[:, 2])
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    normal = random.standard_normal((count, 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    return direction * np.exp(random.uniform(np.log(0.05), np.log(reach), count))[:, None], normal
+
+
+@pytest.mark.parametrize("height", [0.02, 0.3, 1.0, 10.0])
+def test_coaxial_closed_form(height):
+    """E = Φ/(π(h² + ℓ²)), to float32."""
+    radius = 0.4
+    assert form([0, 0, height], [0, 0, -1.0], radius) == pytest.approx(
+        1.0 / (height**2 + radius**2), rel=1e-5
+    )
+
+
+def test_a_far_disc_is_a_point():
+    """At a hundred radii cosθ_x cosθ_j/d² to 0.5 %: (ℓ/d)², some fifty times that for grazing light."""
+    receiver, normal = random_receivers(200, 0)
+    receiver *= 100.0 / np.linalg.norm(receiver, axis=1, keepdims=True)
+    normal[(receiver * normal).sum(1) > 0.0] *= -1.0
+    facing = -(receiver * normal).sum(1)
+    clear = facing > 1.5  # all of it over the horizon
+    point = facing * receiver[:, 2] / (receiver**2).sum(1) ** 2
+    np.testing.assert_allclose(form(receiver, normal, 1.0)[clear], point[clear], rtol=5e-3)
+
+
+def test_exact_over_the_horizon():
+    """Lambert's formula, against the sum over pieces of a disc that is seen whole: 1e-3 of either."""
+    receiver, normal = random_receivers(400, 1)
+    whole = -(receiver * normal).sum(1) > np.sqrt(1.0 - normal[:, 2] ** 2)
+    near = receiver[:, 2] > 0.1  # closer, pieces are not small
+    chosen = np.flatnonzero(whole & near)
+    assert len(chosen) > 20
+    expected = [integral(receiver[i], normal[i], 1.0) for i in chosen]
+    np.testing.assert_allclose(form(receiver[chosen], normal[chosen], 1.0), expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("nearest", "reach", "lost"), [(0.05, 1.0, 0.35), (1.0, 3.0, 0.15), (3.0, 10.0, 0.03)]
+)
+def test_cut_at_the_horizon(nearest, reach, lost):
+    """The part over the horizon, as a disc, gives less than its pieces, by `lost`, and nowhere much more.
+
+    A disc of the part's area still reaches below the horizon, where light counts as negative: the nearer, the
+    more is lost.
+    """
+    receiver, normal = random_receivers(600, 2, reach)
+    facing, slope = -(receiver * normal).sum(1), np.sqrt(1.0 - normal[:, 2] ** 2)
+    near = (receiver[:, 2] > 0.1) & (np.linalg.norm(receiver, axis=1) > nearest)
+    chosen = np.flatnonzero(near & (np.abs(facing) < slope))
+    expected = np.array([integral(receiver[i], normal[i], 1.0) for i in chosen])
+    found = form(receiver[chosen], normal[chosen], 1.0)
+    assert len(chosen) > 10
+    assert -lost < found.sum() / expected.sum() - 1.0 < 0.01
+    assert (found - expected).max() < 0.1
+
+
+def test_share_and_centroid_of_a_part():
+    """Against sums over a fine grid, 1e-3; the parts on both sides of a chord make the disc."""
+    x, y = np.meshgrid(*[(np.arange(2000) + 0.5) / 1000.0 - 1.0] * 2)
+    inside = x**2 + y**2 < 1.0
+    for t in (-0.9, -0.4, 0.0, 0.3, 0.8):
+        part = inside & (x > -t)
+        share, offset = disc_past_chord(jnp.float32(t))
+        assert float(share) == pytest.approx(part.sum() / inside.sum(), abs=1e-3)
+        assert float(offset) == pytest.approx(x[part].mean(), abs=1e-3)
+        assert float(share + disc_past_chord(jnp.float32(-t))[0]) == pytest.approx(1.0, abs=1e-4)
+    assert [float(disc_past_chord(jnp.float32(t))[0]) for t in (-7.0, 7.0)] == pytest.approx(
+        [0.0, 1.0], abs=1e-6
+    )
+
+
+def test_light_fades_towards_its_own_plane():
+    """Closer than an RSM's depth tells, what faces the disc gets less or nothing, as it does from behind."""
+    heights = np.array([-1.0, 0.0, 0.4, 0.75, 1.0]) * FADE_HEIGHT
+    receivers = np.stack([np.full(5, 0.01), np.zeros(5), heights], axis=1)
+    found = form(receivers, np.tile([0.0, 0.0, -1.0], (5, 1)), 0.1) * 0.1**2
+    np.testing.assert_allclose(found, [0.0, 0.0, 0.0, 0.5, 1.0], rtol=1e-2)
+
+
+def test_gradients_are_finite_at_the_hard_points():
+    """In the plane, in the middle, on the rim, parallel, upside down, and a disc without a size."""
+    places = [(0, 0, 0), (0, 0, 1e-9), (1, 0, 0), (1, 0, 1e-9), (0, 0, 1), (0, 0, -1), (5, 0, 0)]
+    normals = [(0, 0, 1), (0, 0, -1), (1, 0, 0), (-1, 0, 0), (0, 1, 0)]
+    for place in np.array(places, float):
+        for normal in np.array(normals, float):
+            for radius in (LEAST_RADIUS, 1.0, 20.0):
+                values = (place @ place, -place @ normal, place[2], normal[2], radius)
+                arguments = tuple(jnp.float32(max(values[0], 1e-18)) if i == 0 else jnp.float32(v)
+                                  for i, v in enumerate(values))  # fmt: skip
+                value, gradient = jax.value_and_grad(disc_form, argnums=(0, 1, 2, 3, 4))(*arguments)
+                assert np.isfinite(value) and value >= 0.0
+                assert np.isfinite(gradient[4]), (place, normal, radius)

@@ -70,6 +70,18 @@ def test_energy_of_few_vpls_is_that_of_the_full_gather(gl_context, vpl_count):
     )
 
 
+@pytest.mark.parametrize("light", ROOM_LIGHTS)
+def test_energy_of_discs_is_that_of_the_full_gather(gl_context, light):
+    """Mean irradiance within 1 %, though where a disc's light comes from is another place for each receiver."""
+    view = room_view(light, (101, 75))
+    cells = {"vpl_count": 200, "density_relaxation": 4, "falloff_footprint": 1.0}
+    full = captured(gl_context, colored_room(), view, 1, **cells)
+    shared = captured(gl_context, colored_room(), view, 4, **cells)
+    seen = full.valid
+    ratio = energy_ratio(shared.vpl_irradiance[seen], full.vpl_irradiance[seen])
+    assert ratio == pytest.approx(1, rel=0.01)
+
+
 def test_blocks_are_no_larger_than_vpls_go_round():
     asked = RuntimeOptions(interleave=8)
     assert [asked.interleave_for(count) for count in (1, 3, 4, 15, 16, 63, 64, 1024)] == [

@@ -72,7 +72,7 @@ def test_energy_of_few_vpls_is_that_of_the_full_gather(gl_context, vpl_count):
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_energy_of_discs_is_that_of_the_full_gather(gl_context, light):
-    """Mean irradiance within 1 %, though where a disc's light comes from is another place for each receiver."""
+    """Mean irradiance within 1 %, though a disc's light comes from another place for each receiver."""
     view = room_view(light, (101, 75))
     cells = {"vpl_count": 200, "density_relaxation": 4, "falloff_footprint": 1.0}
     full = captured(gl_context, colored_room(), view, 1, **cells)

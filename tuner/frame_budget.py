@@ -53,8 +53,9 @@ TIMED = 500.0
 """Milliseconds: a machine that does other things beside is seldom as busy for less."""
 LEVEL_FRAMES = 15
 """Timed at each of two counts, to tell how fast the machine is beside its cost model."""
-SHADOW_SHARE = 0.5
-"""Of the budget, which RSM and placement may take at most before the RSM is made coarser."""
+SHADOW_SHARE = 0.25
+"""Of the budget, which RSM and placement may take at most before the RSM is made coarser. With a half, more
+time went to a finer RSM alone, and the indirect light was worse than with less."""
 LEAST_COUNT = 4
 """VPLs for each pixel of a block, below which a budget is called too small."""
 CHOICE_ROTATIONS = 3

@@ -204,7 +204,7 @@ def test_names_cannot_break_out_and_what_is_left_out_is_said(opened):
     assert page.title() == f"{name} – VPLtune"
     assert page.inner_text("h1") == name
     assert "near field is drawn by the runtime alone" in page.inner_text("#note")
-    assert "VPLs are points, not cells" in page.inner_text("#note")
+    assert "VPLs are points, not discs" in page.inner_text("#note")
 
 
 def test_the_command_writes_one_file(tmp_path, capfd):

@@ -74,7 +74,9 @@ def test_no_absolute_length_in_a_shader():
 
     allowed = {
         "1e-30",  # keeps a quotient finite at zero, far below any square of a length that float32 holds
-        "1e-12",  # a ratio of squared lengths
+        "1e-36",  # as that, of a length in L to the fourth
+        "1e-6",  # a share of a disc's radius
+        "1e-12",  # a ratio of squared lengths, or a squared sine
         "1e-3",  # a share of the scene length
         "2e-3",  # a share of a distance
         "1e-4",  # a cosine

@@ -68,7 +68,7 @@ RSM_RESOLUTION = 256
 """Everyone's. A finer one makes frames dearer, and with them the searches: the bound would be higher."""
 SECONDS_OVER_OURS = 32.0
 """Seconds that a search may take, over ours."""
-MOST_SECONDS = 180.0
+MOST_SECONDS = 120.0
 """And no more than these: where frames take long, the bound is lower."""
 SURROGATE_CAP = 60
 """Evaluations of a search over the surrogate, at each placement."""

@@ -246,6 +246,12 @@ def _checked_auto(document: dict[str, Any], where: str) -> AutoPrior | None:
         raise InputError(
             f"{where}: key 'auto' goes with visibility 'maps', got {document.get('visibility')!r}"
         )
+    relaxation = document["parameters"]["density_relaxation"]
+    if relaxation != 0:
+        raise InputError(
+            f"{where}: key 'auto' goes with parameters.density_relaxation 0, for its α is that of points, "
+            f"got {relaxation}"
+        )
     return AutoPrior.validated(document["auto"], f"{where}: auto")
 
 

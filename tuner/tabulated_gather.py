@@ -75,7 +75,7 @@ def gather_tabulated(table: TabulatedGather, parameters: FalloffParameters) -> F
 
 
 def node_weights(parameters: FalloffParameters) -> Float[Array, " nodes"]:
-    """What each node counts for the polynomial's value at α and κ, in the order of `TabulatedGather`."""
+    """What each node counts for the spline's value at α and κ, in the order of `TabulatedGather`."""
     of_alpha = _spline_weights(_footprint_place(parameters.falloff_footprint), FOOTPRINT_NODES)
     of_kappa = _spline_weights(_transmittance_place(parameters.falloff_transmittance), TRANSMITTANCE_NODES)
     return (of_alpha[:, None] * of_kappa).ravel()

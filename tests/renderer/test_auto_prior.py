@@ -87,6 +87,13 @@ def test_a_prior_goes_with_maps():
         CONFIG.seen_by("transmittance")
 
 
+def test_a_prior_goes_with_points():
+    broken = document()
+    broken["parameters"]["density_relaxation"] = 4
+    with pytest.raises(InputError, match="key 'auto' goes with parameters.density_relaxation 0, .* got 4"):
+        parse_config(json.dumps(broken), "auto.json")
+
+
 @pytest.mark.parametrize("form", ["glsl", "c", "std140"])
 def test_a_prior_is_not_exported_as_constants(form):
     with pytest.raises(InputError, match="sets its parameters anew in each frame; fit a scene from it first"):

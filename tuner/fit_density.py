@@ -172,8 +172,15 @@ def fit_density(
 
 
 def drawn_loss(drawn: Sequence[CapturedView], even_share: float) -> float:
-    """The loss of pictures as they were drawn, but for k, which is at its best; not a number where no view is
-    lit."""
+    """The fit's loss of pictures as they were drawn, but for k, which is at its best for all of them.
+
+    Args:
+        drawn: views captured with a candidate's parameters.
+        even_share: weight of plain squared error beside relMSE, see `tuner.losses`.
+
+    Returns:
+        The mean over views, without unit; not a number where none is lit.
+    """
     terms = []
     for view in drawn:
         picture = view.captured.indirect_irradiance[view.valid].astype(np.float64)

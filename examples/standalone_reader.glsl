@@ -127,10 +127,11 @@ void main() {
     vec4 place = texelFetch(positions, pixel, 0);
     vec3 p = place.xyz, n = texelFetch(normals, pixel, 0).xyz, irradiance = vec3(0.0);
     for (int i = 0; i < vpls.length(); i += 3) {
-        vec3 d = vpls[i].xyz - p;
-        float dd = max(dot(d, d), 1e-30);
-        float footprint = falloff_footprint * vpls[i].w;
-        float form = max(dot(n, d), 0.0) * max(-dot(vpls[i + 1].xyz, d), 0.0) / dd / (dd + footprint * footprint);
+        vec3 d = vpls[i].xyz - p, m = vpls[i + 1].xyz;
+        float dd = max(dot(d, d), 1e-30), footprint = falloff_footprint * vpls[i].w;
+        float form = cells > 0
+            ? disc_form(d / scene_length, n, m, footprint / scene_length) / (scene_length * scene_length)
+            : max(dot(n, d), 0.0) * max(-dot(m, d), 0.0) / dd / (dd + footprint * footprint);
         form *= exp(-falloff_transmittance * sqrt(dd) / scene_length);
         if (form > 0.0) { irradiance += vpls[i + 2].rgb * (intensity / PI * form * visibility(i, p, n)); }
     }

@@ -10,11 +10,14 @@ from pathlib import Path
 import moderngl
 import numpy as np
 from PIL import Image
+from standalone_vpls import virtual_point_lights
+
+PARTS = ("visibility", "disc", "reader")
 
 
 def shader(stage, numbers=()):
     defines = [f"#define {name} {value}" for name, value in [(stage, 1), *numbers]]
-    files = [Path(__file__).with_name(f"standalone_{part}.glsl") for part in ("visibility", "reader")]
+    files = [Path(__file__).with_name(f"standalone_{part}.glsl") for part in PARTS]
     return "\n".join(["#version 430", *defines, *(file.read_text(encoding="utf-8") for file in files)])
 
 
@@ -69,42 +72,6 @@ def light_maps(surfaces, rsm):  # an atlas of position, depth, plane's normal, a
     return atlas
 
 
-def virtual_point_lights(atlas, bundle):
-    """Rows of position, footprint, normal, 0, flux, 0, drawn with chances of flux^gamma; and the length L."""
-    rsm, parameters, flux = bundle["rsm"], bundle["config"]["parameters"], atlas[..., 8:11].mean(-1)
-    size, filtering, count = rsm["resolution"], rsm["filtering"], parameters["vpl_count"]
-    offset = atlas[..., :3] - (flux[..., None] * atlas[..., :3]).sum((0, 1)) / flux.sum()
-    length = np.sqrt((flux * (offset**2).sum(-1)).sum() / flux.sum())
-    weight = np.where(flux > 0, flux ** parameters["density_exponent"], 0)
-    in_row, rows = np.cumsum(weight, axis=1), np.cumsum(weight.sum(1))
-    x, y = ((0.5 + np.arange(1, count + 1)[:, None] * bundle["point_table"]["steps"]) % 1).T
-    row = np.searchsorted(rows, y * rows[-1], "right")
-    column = (in_row[row] <= (x * in_row[row, -1])[:, None]).sum(1)
-    # What the inversion leaves over is the place in the texel.
-    right = 1 + (x * in_row[row, -1] - in_row[row, column]) / weight[row, column]
-    up = 1 + (y * rows[-1] - rows[row]) / in_row[row, -1]
-    # Each VPL has the mean light of the texels around its own.
-    at = np.stack([row, column], axis=1)
-    window = at[:, None] + np.array([*np.ndindex(filtering, filtering)]) - filtering // 2
-    around = tuple(np.moveaxis(window % weight.shape, -1, 0))
-    lit = (window // size == at[:, None] // size).all(-1) & (flux[around] > 0)
-    draws = count * (weight[around] * lit).sum(1)[:, None] / rows[-1]
-    near = (atlas[around] * lit[..., None]).sum(1) / draws
-    # It slides with that place over the plane of its own texel.
-    faces = [rsm["faces"][number] for number in row // size * (weight.shape[1] // size) + column // size]
-    to_world, extent = (np.array([face[key] for face in faces]) for key in ("light_to_world", "extent"))
-    flat = np.array([[face["orthographic"]] for face in faces])
-    place = np.stack([column % size + right, row % size + up], axis=1) * 2 / size - 1
-    across = np.einsum("nij,nj->ni", to_world[:, :3, :2], place * extent)
-    start, ray = to_world[:, :3, 3] + across * flat, across * ~flat - to_world[:, :3, 2]
-    position, normal = atlas[row, column, :3], atlas[row, column, 4:7]
-    along = (normal * ray).sum(1, keepdims=True)
-    slid = start + ray * ((normal * (position - start)).sum(1, keepdims=True) / along)
-    position = np.where(along > -0.02 * np.linalg.norm(ray, axis=1, keepdims=True), position, slid)
-    vpls = [position, np.sqrt(near[:, 7:8] / np.pi), normal, 0 * draws, near[:, 8:11], 0 * draws]
-    return np.hstack(vpls).astype("f4"), length
-
-
 def displayed(radiance, key):
     """Exposed to a mean luminance of `key`, Khronos PBR Neutral tone curve, sRGB; top row first."""
     exposure = key * radiance[..., 3].sum() / (radiance[..., :3] @ [0.2126, 0.7152, 0.0722]).sum()
@@ -131,7 +98,9 @@ def main(folder, output):
     for binding, content in ((4, vpls), (5, bytes(16 * max(maps["map_room"], 1))), (6, bytes(4))):
         context.buffer(content).bind_to_storage_buffer(binding)
     numbers["falloff_transmittance"] *= bundle["config"]["visibility"] != "none"
-    numbers |= {"scene_length": length, "face_size": rsm["resolution"], **maps}
+    cells = bundle["vpl_cells"]
+    numbers |= {"scene_length": length, "face_size": rsm["resolution"], "cells": cells["steps"]}
+    numbers |= cells["disc"] | maps
     if maps["map_room"] > 0:
         context.compute_shader(shader("CASTING", numbers.items())).run(len(vpls))
         context.memory_barrier()

@@ -12,11 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from renderer import vpl_disc_bounds
 from renderer.animation import AnimationPlayer
 from renderer.atomic_file import written_whole
 from renderer.camera_uniforms import camera_uniforms
 from renderer.light_faces import FaceSnapping, LightRecords, light_records
 from renderer.passes.tone_mapping import EXPOSURE_KEY
+from renderer.passes.vpl_cells import LARGEST_COUNT, NORMAL_REACH, sample_count
 from renderer.placed_boxes import placed_boxes
 from renderer.point_table import R2_STEPS
 from renderer.render_targets import MAX_ATLAS_COLUMNS
@@ -85,12 +87,31 @@ def scene_bundle(
             "faces": _faces(records, resolution),
         },
         "point_table": {"kind": "r2", "steps": list(R2_STEPS)},
+        "vpl_cells": _vpl_cells(config),
         "visibility_maps": _visibility_maps(options, config),
         "draws": draws,
         "textures": [_texture(texture, binary) for texture in (*scene.textures, WHITE)],
         "arrays": binary.arrays,
     }
     return SceneBundle(document, bytes(binary.content))
+
+
+def _vpls_are_cells(config: TunedConfig) -> bool:
+    return config.parameters.density_relaxation > 0 and config.parameters.vpl_count <= LARGEST_COUNT
+
+
+def _vpl_cells(config: TunedConfig) -> dict[str, Any]:
+    return {
+        # 0: VPLs are points, and the rest says nothing.
+        "steps": config.parameters.density_relaxation if _vpls_are_cells(config) else 0,
+        "samples": sample_count(config.parameters.vpl_count),
+        "normal_reach": NORMAL_REACH,
+        "disc": {
+            "least_part": vpl_disc_bounds.LEAST_PART,
+            "least_radius": vpl_disc_bounds.LEAST_RADIUS,
+            "fade_height": vpl_disc_bounds.FADE_HEIGHT,
+        },
+    }
 
 
 def _visibility_maps(options: RuntimeOptions, config: TunedConfig) -> dict[str, int]:
@@ -108,12 +129,10 @@ def _visibility_maps(options: RuntimeOptions, config: TunedConfig) -> dict[str, 
 def left_out(config: TunedConfig) -> tuple[str, ...]:
     """What of a config is not drawn outside the runtime, a sentence each."""
     sentences = []
-    if config.parameters.screen_space_strength > 0.0:
+    if config.parameters.screen_space_strength > 0.0 and not _vpls_are_cells(config):
         sentences.append("The screen-space near field is drawn by the runtime alone")
     if config.parameters.density_importance > 0.0:
         sentences.append("Outside the runtime VPLs are placed by flux alone: the same mean, more noise")
-    if config.parameters.density_relaxation > 0:
-        sentences.append("Outside the runtime VPLs are points, not discs: another falloff, and more noise")
     return tuple(sentences)
 
 

@@ -1,6 +1,9 @@
 // VPL cells, part 1: the VPL that is nearest to each sample.
 #include "common/scene_length.glsl"
+
+const float PI = 3.14159265358979;
 #include "common/vpl_cells.glsl"
+#include "common/vpl_cells_buffers.glsl"
 
 layout(local_size_x = 64) in;
 

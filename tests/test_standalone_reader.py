@@ -17,6 +17,7 @@ from renderer.scene import Texture
 from renderer.scene_bundle import scene_bundle, write_bundle
 from renderer.tuned_config import TunedConfig
 from tuner.__main__ import run
+from tuner.fit_density import CELL_FOOTPRINT
 
 READER = Path(__file__).resolve().parents[1] / "examples" / "standalone_reader.py"
 SCENES = READER.parents[1] / "configs" / "scenes"
@@ -25,6 +26,7 @@ WITHOUT_US = (
     "import runpy, sys\n"
     "sys.modules.update(dict.fromkeys(['renderer', 'tuner', 'shaders', 'configs']))\n"
     "sys.argv = sys.argv[1:]\n"
+    "sys.path.insert(0, sys.argv[0].rpartition('/')[0])\n"
     "runpy.run_path(sys.argv[0], run_name='__main__')"
 )
 CONFIG = TunedConfig(
@@ -119,8 +121,31 @@ def test_a_shipped_scene_by_the_command_line(tmp_path, capfd, name, visibility):
     assert np.abs(picture - ours).max() <= 1
 
 
-def test_the_reader_is_short():
-    assert len(READER.read_text(encoding="utf-8").splitlines()) < 150
+@pytest.mark.parametrize("light", ["spot", "point", "directional"])
+def test_cells_shine_as_discs(tmp_path, light):
+    parameters = dataclasses.replace(
+        CONFIG.parameters, vpl_count=32, density_relaxation=8, falloff_footprint=CELL_FOOTPRINT
+    )
+    scene, view, config = (
+        textured_room(),
+        room_view(light, (96, 72)),
+        TunedConfig(parameters, visibility="maps"),
+    )
+    write_bundle(tmp_path, scene_bundle(scene, view, config, rsm_resolution=256))
+    picture, _ = read_picture(tmp_path, tmp_path / "picture.png")
+    ours, points = (
+        renderer.Runtime(scene, TunedConfig(form, visibility="maps"), rsm_resolution=256)
+        .render(view)
+        .astype(int)
+        for form in (parameters, dataclasses.replace(parameters, density_relaxation=0))
+    )
+    assert (np.abs(picture - ours).max(axis=-1) > 1).mean() < 1e-3
+    assert (np.abs(picture - points).max(axis=-1) > 3).mean() > 0.1
+
+
+@pytest.mark.parametrize("file", sorted(READER.parent.glob("standalone_*")), ids=lambda file: file.name)
+def test_the_reader_is_short(file):
+    assert len(file.read_text(encoding="utf-8").splitlines()) < 150
 
 
 def test_a_bundle_is_json_that_describes_its_bytes(tmp_path):

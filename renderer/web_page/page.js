@@ -276,12 +276,19 @@ class Frame {
       this.moments.push(makeTarget(w, h, ["RGBA32F", "R32F"]));
     }
     const most = bundle.config.parameters.vpl_count;
-    this.vpls = makeTarget(bundle.vpl_columns, Math.ceil(most / bundle.vpl_columns), ["RGBA32F", "RGBA32F", "RGBA32F"]);
+    const vplTarget = (count, formats = ["RGBA32F", "RGBA32F", "RGBA32F"]) =>
+      makeTarget(bundle.vpl_columns, Math.ceil(count / bundle.vpl_columns), formats);
+    this.vpls = vplTarget(most);
+    if (this.programs.vpl_cells) {
+      const { samples } = bundle.vpl_cells;
+      [this.samples, this.owners, this.movedVpls] = [vplTarget(samples), vplTarget(samples, ["R32I"]), vplTarget(most)];
+    }
     if (this.programs.vpl_visibility_maps) this.makeVisibility(most);
     this.indirect = [0, 1].map(() => makeTarget(width, height, ["RGBA32F"]));
     this.direct = makeTarget(width, height, ["RGBA32F"]);
     this.radiance = makeTarget(width, height, ["RGBA32F"]);
-    this.pointTable = this.makePointTable(this.vpls.width, this.vpls.height);
+    const { width: pointColumns, height: pointRows } = this.samples ?? this.vpls;
+    this.pointTable = this.makePointTable(pointColumns, pointRows);
     this.blocks = [0, 1].map(() => gl.createBuffer());
   }
 
@@ -320,9 +327,7 @@ class Frame {
   }
 
   castVisibility(vpl_count) {
-    const [vpl_position_footprint, vpl_normal_area, vpl_flux] = this.vpls.textures;
-    const vpls = { vpl_position_footprint, vpl_normal_area, vpl_flux, vpl_count };
-    const values = { ...this.rays, ...vpls, ...this.momentSums };
+    const values = { ...this.rays, ...this.vplValues(this.vpls), ...this.momentSums, vpl_count };
     fill(this.castMaps ?? this.visibility, this.programs.vpl_visibility_maps, values);
     if (this.castMaps) {
       const { vpl_visibility_edges, vpl_visibility_details } = this.programs;
@@ -362,12 +367,38 @@ class Frame {
       gl.disable(gl.SCISSOR_TEST);
     });
     this.sumWeights(state, parameters);
-    const [rows] = bundle.rsm.atlas;
-    const vpl_count = parameters.vpl_count;
-    const sums = { sums_in_rows: this.sumsInRows, sums_of_rows: this.sumsOfRows, rows, vpl_count };
-    const values = { ...this.rsmValues, ...sums, density_exponent: parameters.density_exponent };
-    fill(this.vpls, this.programs.virtual_point_lights, { ...values, point_table: this.pointTable });
+    const { vpl_count, density_relaxation } = parameters;
+    this.vplsAreCells = Boolean(this.samples) && density_relaxation > 0;
+    if (this.vplsAreCells) this.makeCells(parameters);
+    else this.placeVpls(this.vpls, parameters, vpl_count);
     if (this.visibility) this.castVisibility(vpl_count);
+  }
+
+  // So many VPLs, which share all light among them.
+  placeVpls(target, { density_exponent }, vpl_count) {
+    const sums = { sums_in_rows: this.sumsInRows, sums_of_rows: this.sumsOfRows, rows: bundle.rsm.atlas[0], vpl_count };
+    const values = { ...this.rsmValues, ...sums, density_exponent, point_table: this.pointTable };
+    fill(target, this.programs.virtual_point_lights, values);
+  }
+
+  // Samples of the RSM, the first of which are VPLs; steps of Lloyd move those to the middle of the light nearest to them.
+  makeCells(parameters) {
+    this.placeVpls(this.samples, parameters, bundle.vpl_cells.samples);
+    const [sample_position_footprint, sample_normal_area, sample_flux] = this.samples.textures;
+    const samples = { sample_position_footprint, sample_normal_area, sample_flux, sample_rows: this.samples.height };
+    const { vpl_count } = parameters;
+    let before = this.samples;
+    for (let step = 0; step < parameters.density_relaxation; ++step) {
+      const values = { ...samples, ...this.vplValues(before), ...this.momentSums, vpl_count };
+      fill(this.owners, this.programs.vpl_cells_owners, values);
+      fill(this.movedVpls, this.programs.vpl_cells, { ...values, vpl_owners: this.owners.textures[0] });
+      [this.vpls, this.movedVpls] = [this.movedVpls, this.vpls];
+      before = this.vpls;
+    }
+  }
+
+  vplValues({ textures: [vpl_position_footprint, vpl_normal_area, vpl_flux] }) {
+    return { vpl_position_footprint, vpl_normal_area, vpl_flux };
   }
 
   sumWeights(state, parameters) {
@@ -407,12 +438,12 @@ class Frame {
 
   // Add the VPLs from `first` to `end` to the picture.
   gather(camera, parameters, first, end) {
-    const [vpl_position_footprint, vpl_normal_area, vpl_flux] = this.vpls.textures;
     const [target, earlier] = this.indirect;
     const falloff_transmittance = bundle.config.visibility === "none" ? 0 : parameters.falloff_transmittance;
-    fill(target, this.programs.vpl_gather, {
-      ...this.cameraValues(camera), ...parameters, ...this.momentSums, falloff_transmittance, first, end,
-      vpl_position_footprint, vpl_normal_area, vpl_flux, earlier: earlier.textures[0],
+    const { vpl_gather, vpl_gather_cells } = this.programs;
+    fill(target, this.vplsAreCells ? vpl_gather_cells : vpl_gather, {
+      ...this.cameraValues(camera), ...parameters, ...this.vplValues(this.vpls), ...this.momentSums,
+      falloff_transmittance, first, end, earlier: earlier.textures[0],
       visibility_atlas: this.visibility?.textures[0], visibility_details: this.visibilityDetails?.textures[0],
     });
     this.indirect.reverse();

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from renderer import vpl_disc_bounds
 from renderer.artist_parameters import ARTIST_PARAMETERS
 from renderer.bounding_volumes import COUNT_BITS, LEAF_ITEMS, NODE_DTYPE, build_bounding_volumes
 from renderer.errors import InputError
@@ -39,6 +40,7 @@ _SHADERS = (
     "web/material_resolve.frag",
     "web/tone_mapping.frag",
 )
+_CELL_SHADERS = ("web/vpl_cells_owners.frag", "web/vpl_cells.frag", "web/vpl_gather_cells.frag")
 _MAP_SHADERS = ("web/vpl_visibility_maps.frag",)
 _DETAIL_SHADERS = ("web/vpl_visibility_edges.frag", "web/vpl_visibility_details.frag")
 _HEADER = """#version 300 es
@@ -59,6 +61,7 @@ def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
     if not bundle.document["lights"]:
         raise InputError("web page: the view must have a light")
     defines = _defines(bundle.document)
+    cells = bundle.document["vpl_cells"]["steps"] > 0
     binary = bundle.binary
     arrays = {name: at for name, at in bundle.document["arrays"].items() if name not in ("lights", "faces")}
     if defines["VISIBILITY_MAP_SIZE"]:
@@ -79,7 +82,7 @@ def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
         "STYLE": _text("page.css"),
         "DOCUMENT": _json(document),
         "BINARY": base64.b64encode(zlib.compress(binary, 9)).decode("ascii"),
-        "SHADERS": _json(_shaders(defines)),
+        "SHADERS": _json(_shaders(defines, cells)),
         "SCRIPT": _text("page.js") + _text("controls.js"),
     }
     page = _text("page.html")
@@ -104,6 +107,8 @@ def _defines(document: dict[str, Any]) -> dict[str, Define]:
         "RAY_COUNT_BITS": COUNT_BITS,
         "RAY_STACK_SIZE": _TREE_DEPTH,
         "EXPOSURE_KEY": EXPOSURE_KEY,
+        "NORMAL_REACH": document["vpl_cells"]["normal_reach"],
+        **vpl_disc_bounds.DEFINES,
     }
 
 
@@ -130,8 +135,10 @@ def _whole_rows(values: np.ndarray) -> np.ndarray:
     return np.concatenate([values, np.zeros(rows * 4 * DATA_COLUMNS - len(values), values.dtype)])
 
 
-def _shaders(defines: dict[str, Define]) -> dict[str, str]:
+def _shaders(defines: dict[str, Define], cells: bool) -> dict[str, str]:
     names = _SHADERS
+    if cells:
+        names += _CELL_SHADERS
     if defines["VISIBILITY_MAP_SIZE"]:
         names += _MAP_SHADERS
         if defines["VISIBILITY_MAP_REFINEMENT"] > 1:

@@ -2,8 +2,6 @@
 // common/virtual_point_lights.glsl, and of whoever includes it: `sum_in_row(row, column)` and `sum_of_rows(row)`, the
 // sums up to and with a column or row; `sampling_weight(texel, flux)`, `total_weight`, `vpl_count` and `rows`.
 
-const VirtualPointLight NO_VPL = VirtualPointLight(vec4(0.0), vec4(0.0, 0.0, 1.0, 0.0), vec4(0.0));
-
 // First index whose running sum exceeds `target`.
 int row_above(float target) {
     int low = 0;

@@ -1,10 +1,14 @@
-// Indirect irradiance from some of the VPLs, added to what earlier ones gave.
+// Indirect irradiance from some of the VPLs, added to what earlier ones gave. With VPL_CELLS, VPLs shine as discs,
+// and else as points.
 #include "common/gbuffer.glsl"
 #include "common/virtual_point_lights.glsl"
 #include "web/scene_length.glsl"
 
 const float PI = 3.14159265358979;
 #include "common/vpl_irradiance.glsl"
+#ifdef VPL_CELLS
+#include "common/vpl_disc.glsl"
+#endif
 #include "web/vpl_texture.glsl"
 #if VISIBILITY_MAP_SIZE > 0
 #include "web/visibility_atlas.glsl"
@@ -34,8 +38,14 @@ void main() {
     vec3 irradiance = vec3(0.0);
     for (int i = first; i < end; ++i) {
         VirtualPointLight vpl = vpl_at(i);
+#ifdef VPL_CELLS
+        vec3 to_vpl = vpl.position_footprint.xyz - receiver.position_world;
+        vec3 arriving = cell_vector_irradiance(to_vpl, receiver.normal_world, vpl, scene_length, parameters);
+        vec3 unoccluded = vpl.flux.rgb * max(dot(receiver.normal_world, arriving), 0.0);
+#else
         vec3 unoccluded = vpl_irradiance(
             receiver.position_world, receiver.normal_world, vpl, scene_length, parameters);
+#endif
 #if VISIBILITY_MAP_SIZE > 0
         if (any(greaterThan(unoccluded, vec3(0.0)))) {
             unoccluded *= vpl_visibility(

@@ -1,0 +1,84 @@
+"""Virtual point lights for standalone_reader.py: rows of position, footprint, normal, 0, flux, 0.
+
+The atlas: what the lights see, texel by texel: position, depth, plane's normal, area, flux, 1.
+"""
+
+import numpy as np
+
+DARK = [*np.zeros(6), 1.0, *np.zeros(5)]
+
+
+def virtual_point_lights(atlas, bundle):
+    """The VPLs, and the scene's length L: the spread of its light."""
+    flux, position = atlas[..., 8:11].mean(-1), atlas[..., :3]
+    offset = position - (flux[..., None] * position).sum((0, 1)) / flux.sum()
+    length = np.sqrt((flux * (offset**2).sum(-1)).sum() / flux.sum())
+    count, rules = bundle["config"]["parameters"]["vpl_count"], bundle["vpl_cells"]
+    if rules["steps"] == 0:
+        vpls = drawn(atlas, bundle, count)
+    else:
+        samples = drawn(atlas, bundle, rules["samples"])
+        vpls = samples[:count]
+        for _ in range(rules["steps"]):
+            vpls = relaxed(vpls, samples[samples[:, 3] > 0], length, rules["normal_reach"])
+    return vpls.astype("f4"), length
+
+
+def drawn(atlas, bundle, count):
+    """So many VPLs, with chances of flux^gamma."""
+    rsm, flux = bundle["rsm"], atlas[..., 8:11].mean(-1)
+    size, filtering = rsm["resolution"], rsm["filtering"]
+    weight = np.where(flux > 0, flux ** bundle["config"]["parameters"]["density_exponent"], 0)
+    in_row, rows = np.cumsum(weight, axis=1), np.cumsum(weight.sum(1))
+    x, y = ((0.5 + np.arange(1, count + 1)[:, None] * bundle["point_table"]["steps"]) % 1).T
+    row = np.searchsorted(rows, y * rows[-1], "right")
+    column = (in_row[row] <= (x * in_row[row, -1])[:, None]).sum(1)
+    # What the inversion leaves over is the place in the texel.
+    right = 1 + (x * in_row[row, -1] - in_row[row, column]) / weight[row, column]
+    up = 1 + (y * rows[-1] - rows[row]) / in_row[row, -1]
+    # Each VPL has the mean light of the texels around its own.
+    at = np.stack([row, column], axis=1)
+    window = at[:, None] + np.array([*np.ndindex(filtering, filtering)]) - filtering // 2
+    around = tuple(np.moveaxis(window % weight.shape, -1, 0))
+    lit = (window // size == at[:, None] // size).all(-1) & (flux[around] > 0)
+    draws = count * (weight[around] * lit).sum(1)[:, None] / rows[-1]
+    near = (atlas[around] * lit[..., None]).sum(1) / draws
+    # It slides with that place over the plane of its own texel.
+    faces = [rsm["faces"][number] for number in row // size * (weight.shape[1] // size) + column // size]
+    to_world, extent = (np.array([face[key] for face in faces]) for key in ("light_to_world", "extent"))
+    flat = np.array([[face["orthographic"]] for face in faces])
+    place = np.stack([column % size + right, row % size + up], axis=1) * 2 / size - 1
+    across = np.einsum("nij,nj->ni", to_world[:, :3, :2], place * extent)
+    start, ray = to_world[:, :3, 3] + across * flat, across * ~flat - to_world[:, :3, 2]
+    position, normal = atlas[row, column, :3], atlas[row, column, 4:7]
+    along = (normal * ray).sum(1, keepdims=True)
+    slid = start + ray * ((normal * (position - start)).sum(1, keepdims=True) / along)
+    position = np.where(along > -0.02 * np.linalg.norm(ray, axis=1, keepdims=True), position, slid)
+    vpls = [position, np.sqrt(near[:, 7:8] / np.pi), normal, 0 * draws, near[:, 8:11], 0 * draws]
+    return np.hstack(vpls)
+
+
+def relaxed(vpls, samples, length, reach):
+    """The VPLs in the middles of their cells, with the light of the samples nearest to each (Lloyd 1982)."""
+
+    def element(position, normal):  # normals count too: no cell goes round a corner
+        return np.concatenate([position / length, reach * normal], axis=-1)
+
+    elements, owners = element(samples[:, :3], samples[:, 4:7]), element(vpls[:, :3], vpls[:, 4:7])
+    # Less the square of the element, which is the same for all VPLs; dark ones own nothing.
+    away = np.where(vpls[:, 3] > 0, (owners**2).sum(1), np.inf) - 2 * elements @ owners.T
+    owner, moved = away.argmin(1), np.tile(DARK, (len(vpls), 1))
+    for number in np.unique(owner):
+        own = samples[owner == number]
+        middle, facing = own[:, :3].mean(0), own[:, 4:7].sum(0)
+        # A disc of the cell's spread, where a sample's own disc spreads by half its radius squared.
+        radius = np.sqrt(2 * ((own[:, :3] - middle) ** 2).sum(1).mean() + (own[:, 3] ** 2).mean())
+        there = element(middle, facing / max(np.linalg.norm(facing), 1e-30))
+        near = own[((elements[owner == number] - there) ** 2).sum(1).argmin()]
+        # To the middle over the plane of the sample next to it, but within its disc: the middle of what
+        # surrounds a box lies in the box.
+        slide = middle - near[:3]
+        slide -= near[4:7] * (near[4:7] @ slide)
+        slide *= min(1, near[3] / max(np.linalg.norm(slide), 1e-30))
+        moved[number] = [*near[:3] + slide, radius, *near[4:7], 0, *own[:, 8:11].sum(0), 0]
+    return moved

@@ -1,0 +1,11 @@
+// Samples of the RSM from textures, laid out as VPLs are.
+uniform sampler2D sample_position_footprint;
+uniform sampler2D sample_normal_area;
+uniform sampler2D sample_flux;
+
+VirtualPointLight sample_at(ivec2 texel) {
+    return VirtualPointLight(
+        texelFetch(sample_position_footprint, texel, 0),
+        texelFetch(sample_normal_area, texel, 0),
+        texelFetch(sample_flux, texel, 0));
+}

@@ -164,7 +164,8 @@ def _interleaved_row(
 def _place(drawn: _Drawn) -> None:
     """From RSM to VPLs: densities, scene length and placement."""
     frame, origin = drawn.frame, drawn.records.moment_origin
-    frame.virtual_point_lights.draw(frame.rsm, origin, (0.0, 0.0))
+    frame.virtual_point_lights.distribute(frame.rsm, origin)
+    frame.virtual_point_lights.draw(frame.rsm, (0.0, 0.0))
 
 
 def _readback_milliseconds(context: moderngl.Context, drawn: _Drawn) -> tuple[float, float, float]:

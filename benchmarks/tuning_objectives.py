@@ -9,11 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from renderer.artist_parameters import ArtistParameters, parameter_spec
-from renderer.capture import read_picture
+from renderer.capture import CapturedFrame, read_picture
 from renderer.frame import Frame
 from renderer.runtime import Runtime
+from renderer.views import View
 from tuner.captured_view import CapturedView
-from tuner.fit_density import Rotation
+from tuner.fit_density import Rotation, view_rotations
 from tuner.losses.relative_squared_error import Target, target_of, weighted_squared_error
 from tuner.search_space import FALLOFF_SPECS, VISIBILITY_SPECS, SearchSpace
 from tuner.virtual_point_lights import gather_inputs
@@ -64,6 +65,11 @@ class CountingRuntime(Runtime):
         self.frames += 1
         return super()._draw(*arguments, **keywords)
 
+    def captures(self, view: View, table_rotations: Sequence[Rotation]) -> list[CapturedFrame]:
+        # Though the others are drawn in part only.
+        self.frames += len(table_rotations) - 1
+        return super().captures(view, table_rotations)
+
 
 class RuntimeLoss:
     """relMSE, free of the reference's noise, of what the runtime draws: every view drawn at every rotation of
@@ -90,8 +96,10 @@ class RuntimeLoss:
     def of_pictures(self, picture_of: Callable[[CapturedView, Rotation], np.ndarray]) -> float:
         """The loss of any pictures, [height, width, 3] each."""
         losses = []
-        for view, (half_a, half_b, weight) in zip(self._views, self._targets, strict=True):
-            for rotation in self._rotations:
+        for index, (view, (half_a, half_b, weight)) in enumerate(
+            zip(self._views, self._targets, strict=True)
+        ):
+            for rotation in view_rotations(self._rotations, index):
                 values = picture_of(view, rotation)[view.valid].astype(np.float64)
                 losses.append(float((weight * (values - half_a) * (values - half_b)).sum()))
         return float(np.mean(losses))

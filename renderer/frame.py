@@ -126,6 +126,21 @@ class Frame:
         lights: DynamicLights | None = None,
     ) -> None:
         """Draw `view` up to the irradiance buffers."""
+        accumulated = self._draw_surfaces(view, records, parameters, lights)
+        self._draw_indirect(view, parameters, table_rotation, accumulated)
+
+    def draw_indirect_again(
+        self, view: View, parameters: ArtistParameters, table_rotation: tuple[float, float]
+    ) -> None:
+        """Indirect light once more, by other VPLs, of the view as `draw` has left it, without dynamic
+        lights."""
+        self._context.memory_barrier(self._context.SHADER_IMAGE_ACCESS_BARRIER_BIT)
+        self._draw_indirect(view, parameters, table_rotation, None)
+
+    def _draw_surfaces(
+        self, view: View, records: LightRecords, parameters: ArtistParameters, lights: DynamicLights | None
+    ) -> LightAccumulation | None:
+        """What camera and lights see, direct light, and how VPLs are to be spread."""
         camera = self.camera(view)
         # Passes write into pictures that the last frame's may still be reading.
         self._context.memory_barrier(self._context.SHADER_IMAGE_ACCESS_BARRIER_BIT)
@@ -138,11 +153,22 @@ class Frame:
         if parameters.density_importance > 0.0:
             self._vpl_importance.draw(camera, self.gbuffer, self.rsm)
         self._vpl_importance.bind()
-        self._place_vpls(records, table_rotation, parameters.density_relaxation)
-        self._cast_visibility_maps()
+        self.virtual_point_lights.distribute(self.rsm, records.moment_origin)
         self._direct_light.draw(
             camera, self.gbuffer, self.rsm, len(view.lights), accumulated, self.direct_irradiance
         )
+        return accumulated
+
+    def _draw_indirect(
+        self,
+        view: View,
+        parameters: ArtistParameters,
+        table_rotation: tuple[float, float],
+        accumulated: LightAccumulation | None,
+    ) -> None:
+        camera = self.camera(view)
+        self._place_vpls(table_rotation, parameters.density_relaxation)
+        self._cast_visibility_maps()
         self._set_auto_parameters(camera)
         self._gather(camera)
         self.indirect_irradiance = self.vpl_irradiance
@@ -180,17 +206,15 @@ class Frame:
         """The view's camera as the shaders know it."""
         return camera_uniforms(view.camera, self.size, self._scene.bounds())
 
-    def _place_vpls(
-        self, records: LightRecords, table_rotation: tuple[float, float], relaxation: int
-    ) -> None:
+    def _place_vpls(self, table_rotation: tuple[float, float], relaxation: int) -> None:
         vpls = self.virtual_point_lights
         self.vpls_are_cells = relaxation > 0 and vpls.count <= LARGEST_COUNT
         if not self.vpls_are_cells:
-            vpls.draw(self.rsm, records.moment_origin, table_rotation)
+            vpls.draw(self.rsm, table_rotation)
             return
         if self._vpl_cells is None:
             self._vpl_cells = VplCellsPass(self._context, vpls.count)
-        vpls.draw(self.rsm, records.moment_origin, table_rotation, self._vpl_cells.sample_count)
+        vpls.draw(self.rsm, table_rotation, self._vpl_cells.sample_count)
         assert vpls.samples is not None
         self._vpl_cells.draw(vpls.samples, vpls.virtual_point_lights, relaxation)
 

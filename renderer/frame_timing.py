@@ -18,7 +18,7 @@ from renderer.frame import Frame
 Clock = Literal["gpu", "wall"]
 
 _SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swiftshader", "software rasterizer")
-_STEPS = ("draw", "refine")
+_STEPS = ("distribute", "draw", "refine")
 """What a pass is asked to do in a frame."""
 
 

@@ -1,7 +1,7 @@
 """The runtime: a scene and a tuned config in, pictures out."""
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -234,7 +234,21 @@ class Runtime:
         `table_rotation` in [0, 1)² shifts the VPL point table on its torus: another, equally good
         placement of the VPLs.
         """
-        frame = self._draw(view, table_rotation, lights)
+        return self._captured(self._draw(view, table_rotation, lights), view)
+
+    @_on_own_context
+    def captures(self, view: View, table_rotations: Sequence[tuple[float, float]]) -> list[CapturedFrame]:
+        """As `capture`, once for each rotation: what does not depend on it is drawn once."""
+        captured = []
+        for index, rotation in enumerate(table_rotations):
+            if index == 0:
+                frame = self._draw(view, rotation)
+            else:
+                frame.draw_indirect_again(view, self._gathered_parameters(), rotation)
+            captured.append(self._captured(frame, view))
+        return captured
+
+    def _captured(self, frame: Frame, view: View) -> CapturedFrame:
         captured = capture_frame(frame, view)
         check_errors(self._context, f"the buffers of view {view.name}")
         return captured
@@ -247,11 +261,13 @@ class Runtime:
     ) -> Frame:
         records = frame_light_records(self.scene_buffers, view, self._snapped_cells(view))
         frame = self._frame(view.size, len(records.faces))
-        parameters = self.parameters
-        if self.visibility == "none":
-            parameters = replace(parameters, falloff_transmittance=0.0)
-        frame.draw(view, records, parameters, table_rotation, lights)
+        frame.draw(view, records, self._gathered_parameters(), table_rotation, lights)
         return frame
+
+    def _gathered_parameters(self) -> ArtistParameters:
+        if self.visibility == "none":
+            return replace(self.parameters, falloff_transmittance=0.0)
+        return self.parameters
 
     def _frame(self, size: tuple[int, int], face_count: int) -> Frame:
         maps = self.visibility == "maps"

@@ -5,14 +5,11 @@ the mean of the loss over several rotations of the point table (Cranley and Patt
 every candidate (common random numbers): it holds the bias of the falloff and the variance of the placement,
 and at few VPLs the best α, k and κ are others than at many.
 
-Over (γ, η) the loss is measured in the runtime, along one axis after the other, each candidate's picture at
-its best k: as density shifts, VPLs cross edges and corners, and in a Cornell box one step of 0.05 in seven
-goes against the smooth trend (row `density_slope_agreement` of `vpltune bench density`). In four rooms this
-ends where a grid of nine and the minimum of a quadratic through it did, in half the time, but in one with a
-loss 3 % higher (relMSE of held-out rotations: 2 %).
-
-Falloff and maps are fitted once, at the best density. Fitted at every candidate, they chose the same one in
-eight of nine scenes, for twice the time, and in the ninth one with 2 % less loss.
+Over (γ, η) the loss is measured, along one axis after the other, with falloff and maps fitted at every
+candidate: as density shifts, VPLs cross edges and corners, and in a Cornell box one step of 0.05 in seven
+goes against the smooth trend (row `density_slope_agreement` of `vpltune bench density`). What the runtime
+draws with the start's falloff would cost two thirds as much, but where the falloff is what is wrong all
+densities look the same by it: in one room the density that it chose left 1.5 times the relMSE.
 
 Every candidate but the start's own has cells (`density_relaxation`): at few VPLs most of the error is that a
 point shines for all that lies around it, not where shadows fall.
@@ -23,6 +20,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -32,7 +30,7 @@ from tuner.captured_view import CapturedView
 from tuner.fit_falloff import fit_falloff
 from tuner.fit_status import Descent
 from tuner.fit_visibility import fit_falloff_and_visibility
-from tuner.losses.relative_squared_error import DARK_SHARE, EVEN_SHARE, target_of
+from tuner.losses.relative_squared_error import EVEN_SHARE, target_of, weighted_squared_error
 from tuner.search_space import held_for
 
 ROTATIONS = 8
@@ -45,12 +43,14 @@ RELAXATION = 8
 """Steps towards the middles of cells (rows `relaxation_…` of `vpltune bench density`)."""
 CELL_FOOTPRINT = 1.0
 """α where a fit of cells begins: discs as wide as their cells. Points do best at about half of that."""
-_IMPORTANCES = (0.0, 0.5, 1.0)
-"""Of η, at γ = 1; more where their parabola is least, in steps of a tenth."""
+_IMPORTANCES = (0.25, 0.5, 0.75, 1.0)
+"""Of η, at γ = 1. That of 0 is as a rule the start's."""
 _EXPONENTS = (0.75, 0.5, 0.25, 0.0)
 """Of γ, at the best η, for as long as the loss falls."""
-_TRIALS = 6
-"""As a rule: the start's own, three of η, one at their parabola's minimum, one of γ."""
+_TRIALS = len(_IMPORTANCES) + 2
+"""As a rule: the start's own, those of η, one of γ."""
+_VIEW_SHIFT = (math.sqrt(2.0) - 1.0, math.sqrt(3.0) - 1.0)
+"""From a view's rotations to those of the next. R2's own step would give the same points but one."""
 
 Rotation = tuple[float, float]
 Density = tuple[float, float, int]
@@ -59,7 +59,7 @@ Density = tuple[float, float, int]
 
 @dataclass(frozen=True)
 class DensityTrial:
-    """One candidate: its densities, and the loss of what the runtime draws with it, at the best k."""
+    """One candidate: its densities, and its loss with falloff and maps at their best."""
 
     density_exponent: float
     density_importance: float
@@ -83,18 +83,28 @@ def table_rotations(count: int, seed: int, *, held_out: bool = False) -> tuple[R
     return tuple(drawn) if held_out else ((0.0, 0.0), *drawn[1:])
 
 
+def view_rotations(rotations: Sequence[Rotation], index: int) -> tuple[Rotation, ...]:
+    """Those of one of several views: the first is everyone's, the others are shifted.
+
+    Views under the same lights would else have the same VPLs, and fewer placements would be seen.
+    """
+    shift = index * np.array(_VIEW_SHIFT)
+    moved = [tuple(float(x) for x in (np.array(rotation) + shift) % 1.0) for rotation in rotations[1:]]
+    return (*rotations[:1], *moved)
+
+
 def rotated_views(
     runtime: Runtime,
     views: Sequence[CapturedView],
     parameters: ArtistParameters,
     rotations: Sequence[Rotation],
 ) -> tuple[CapturedView, ...]:
-    """Every view drawn with `parameters` at every rotation, against its one reference."""
+    """Every view drawn with `parameters` at its rotations, against its one reference."""
     runtime.parameters = parameters
     return tuple(
-        CapturedView(view.view, view.reference, runtime.capture(view.view, rotation))
-        for view in views
-        for rotation in rotations
+        CapturedView(view.view, view.reference, captured)
+        for index, view in enumerate(views)
+        for captured in runtime.captures(view.view, view_rotations(rotations, index))
     )
 
 
@@ -104,7 +114,8 @@ def rotation_errors(
     parameters: ArtistParameters,
     rotations: Sequence[Rotation],
 ) -> Float[np.ndarray, "views rotations"]:
-    """relMSE of the runtime's own picture, free of the reference's noise, by view and rotation."""
+    """relMSE of the runtime's own picture, free of the reference's noise (`tuner.losses`), by view and
+    rotation; 0 where a view is unlit."""
     rotated = rotated_views(runtime, views, parameters, rotations)
     return np.array([_relmse(view) for view in rotated]).reshape(len(views), len(rotations))
 
@@ -131,85 +142,43 @@ def fit_density(
         progress: called with the share done, in [0, 1].
     """
     chosen = table_rotations(ROTATIONS, seed) if rotations is None else tuple(rotations)
-    losses: dict[Density, float] = {}
-    captured: tuple[CapturedView, ...] = ()
+    fits: dict[Density, tuple[ArtistParameters, Descent]] = {}
 
     def best() -> Density:
-        return min(losses, key=lambda density: losses[density])
+        return min(fits, key=lambda density: fits[density][1].loss)
 
-    def measure(density: Density) -> float:
-        nonlocal captured
-        if density not in losses:
-            drawn = rotated_views(runtime, views, _with(start, density), chosen)
-            losses[density] = drawn_loss(drawn, even_share)
-            captured = drawn if best() == density else captured
+    def measure(density: Density) -> Descent:
+        if density not in fits:
+            parameters = _with(start, density)
+            drawn = rotated_views(runtime, views, parameters, chosen)
+            if runtime.visibility == "maps":
+                fits[density] = fit_falloff_and_visibility(
+                    drawn, parameters, seed=seed, even_share=even_share
+                )
+            else:
+                held = held_for(runtime.visibility)
+                fits[density] = fit_falloff(drawn, parameters, seed=seed, held=held, even_share=even_share)
             if progress is not None:
-                progress(min(len(losses) / (_TRIALS + 1), 1.0))
-        return losses[density]
+                progress(min(len(fits) / _TRIALS, 1.0))
+        return fits[density][1]
 
-    def fitted(density: Density) -> DensityFit:
-        parameters, held = _with(start, density), held_for(runtime.visibility)
-        if runtime.visibility == "maps":
-            result = fit_falloff_and_visibility(captured, parameters, seed=seed, even_share=even_share)
-        else:
-            result = fit_falloff(captured, parameters, seed=seed, held=held, even_share=even_share)
-        return DensityFit(*result, tuple(DensityTrial(*tried, loss) for tried, loss in losses.items()))
+    def result() -> DensityFit:
+        trials = (DensityTrial(*density, descent.loss) for density, (_, descent) in fits.items())
+        return DensityFit(*fits[best()], tuple(trials))
 
     # The start itself is a candidate: the result is never worse than it.
-    first = (start.density_exponent, start.density_importance, start.density_relaxation)
-    if not math.isfinite(measure(first)):
-        # Nothing lit, or not finite: no density will mend it, and the fit says which.
-        return fitted(first)
-    row = [measure((1.0, importance, RELAXATION)) for importance in _IMPORTANCES]
-    importance = round(parabola_minimum(_IMPORTANCES, row), 1)
-    measure((1.0, importance, RELAXATION))
-    importance = min((*_IMPORTANCES, importance), key=lambda place: losses[1.0, place, RELAXATION])
+    own = measure((start.density_exponent, start.density_importance, start.density_relaxation))
+    if own.status.nothing_fitted:
+        # Nothing lit, or not finite: no density will mend it.
+        return result()
+    for importance in _IMPORTANCES:
+        measure((1.0, importance, RELAXATION))
+    importance = best()[1]
     for exponent in _EXPONENTS:
         measure((exponent, importance, RELAXATION))
         if best() != (exponent, importance, RELAXATION):
             break
-    return fitted(best())
-
-
-def drawn_loss(drawn: Sequence[CapturedView], even_share: float) -> float:
-    """The fit's loss of pictures as they were drawn, but for k, which is at its best for all of them.
-
-    Args:
-        drawn: views captured with a candidate's parameters.
-        even_share: weight of plain squared error beside relMSE, see `tuner.losses`.
-
-    Returns:
-        The mean over views, without unit; not a number where none is lit.
-    """
-    terms = []
-    for view in drawn:
-        picture = view.captured.indirect_irradiance[view.valid].astype(np.float64)
-        halves = (half[view.valid] for half in (view.reference.irradiance_a, view.reference.irradiance_b))
-        target = target_of(*halves, even_share)
-        half_a, half_b, weight = (
-            np.asarray(x, np.float64) for x in (target.half_a, target.half_b, target.weight)
-        )
-        terms.append(
-            (
-                (weight * picture**2).sum(),
-                (weight * picture * (half_a + half_b)).sum(),
-                (weight * half_a * half_b).sum(),
-            )
-        )
-    square, product, constant = np.mean(terms, axis=0)
-    # Of square · k² - product · k + constant.
-    return float(constant - product**2 / (4.0 * square)) if square > 0.0 else math.nan
-
-
-def parabola_minimum(places: Sequence[float], losses: Sequence[float]) -> float:
-    """Where the parabola through the logarithms of three losses is least between the outer places."""
-    # A fit without the reference's noise may end at or below 0; the floor keeps the logarithm finite.
-    values = np.array(losses)
-    logs = np.log(np.maximum(values, 1e-3 * np.abs(values).max() + 1e-30))
-    curvature, slope, _ = np.polyfit(places, logs, 2)
-    if curvature <= 0.0:
-        return float(places[np.argmin(logs)])
-    return float(np.clip(-slope / (2.0 * curvature), min(places), max(places)))
+    return result()
 
 
 def density_document(
@@ -254,11 +223,6 @@ def _with(parameters: ArtistParameters, density: Density) -> ArtistParameters:
 
 
 def _relmse(view: CapturedView) -> float:
-    """mean((y − a)(y − b) / (r² + 0.01·mean(r)²)): relMSE without the noise of the reference's halves."""
-    y = view.captured.indirect_irradiance[view.valid].astype(np.float64)
-    a, b = (half[view.valid] for half in (view.reference.irradiance_a, view.reference.irradiance_b))
-    r = (a.astype(np.float64) + b) / 2.0
-    denominator = r**2 + DARK_SHARE * r.mean() ** 2 if r.size else r
-    if not denominator.any():
-        return math.nan
-    return float(np.mean((y - a) * (y - b) / denominator))
+    halves = (half[view.valid] for half in (view.reference.irradiance_a, view.reference.irradiance_b))
+    picture = jnp.asarray(view.captured.indirect_irradiance[view.valid])
+    return float(weighted_squared_error(picture, target_of(*halves, even_share=0.0)))

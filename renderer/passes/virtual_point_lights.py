@@ -52,21 +52,12 @@ class VirtualPointLightsPass:
         self.samples: moderngl.Buffer | None = None
         self._sample_table: moderngl.Buffer | None = None
 
-    def draw(
-        self,
-        rsm: ReflectiveShadowMap,
-        moment_origin: tuple[float, float, float],
-        table_rotation: tuple[float, float],
-        sample_count: int = 0,
-    ) -> None:
-        """Place the VPLs, by the densities γ and η and the importance that are bound: chance ∝ flux^γ · F.
+    def distribute(self, rsm: ReflectiveShadowMap, moment_origin: tuple[float, float, float]) -> None:
+        """How VPLs are spread over the RSM, by the densities γ and η and the importance that are bound.
 
-        `table_rotation` shifts the point table on its torus, in [0, 1)². Where `sample_count` is not 0, so
-        many are placed in `samples` instead, from the R2 sequence, which share all light among them.
+        A texel's chance is ∝ flux^γ · F.
         """
-        for binding, buffer in self._buffers.items():
-            buffer.bind_to_storage_buffer(binding)
-        self.bind()
+        self._bind_density()
         context = self._context
         rsm.bind(self._row_density, 0)
         set_uniforms(self._row_density, moment_origin=moment_origin)
@@ -75,6 +66,16 @@ class VirtualPointLightsPass:
         set_uniforms(self._marginal_density, rows=rsm.rows)
         self._marginal_density.run(1)
         context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT)
+
+    def draw(
+        self, rsm: ReflectiveShadowMap, table_rotation: tuple[float, float], sample_count: int = 0
+    ) -> None:
+        """Place the VPLs, as they were last distributed over `rsm`.
+
+        `table_rotation` shifts the point table on its torus, in [0, 1)². Where `sample_count` is not 0, so
+        many are placed in `samples` instead, from the R2 sequence, which share all light among them.
+        """
+        self._bind_density()
         rsm.bind(self._placement, 0)
         set_uniforms(self._placement, rows=rsm.rows, table_rotation=table_rotation)
         if sample_count > 0:
@@ -86,6 +87,11 @@ class VirtualPointLightsPass:
         """Bind what the gather reads."""
         self.frame_statistics.bind_to_storage_buffer(buffer_bindings.FRAME_STATISTICS)
         self.virtual_point_lights.bind_to_storage_buffer(buffer_bindings.VIRTUAL_POINT_LIGHTS)
+
+    def _bind_density(self) -> None:
+        for binding, buffer in self._buffers.items():
+            buffer.bind_to_storage_buffer(binding)
+        self.bind()
 
     def _place(self, count: int) -> None:
         set_uniforms(self._placement, vpl_count=count)

@@ -77,6 +77,18 @@ def test_importance_has_no_unit(gl_context, factor):
 
 
 @pytest.mark.parametrize("density_relaxation", [0, 4])
+def test_many_rotations_of_one_view_are_bitwise_those_of_one_frame_each(gl_context, density_relaxation):
+    """What does not depend on the rotation is drawn once, and nothing of one rotation is left in the next."""
+    options = {"vpl_count": 64, "density_importance": 0.7, "screen_space_strength": 1.0}
+    runtime = runtime_with(gl_context, **options, density_relaxation=density_relaxation)
+    view, rotations = corner_view("spot"), ((0.0, 0.0), (0.3, 0.7), (0.9, 0.1))
+    for rotation, captured in zip(rotations, runtime.captures(view, rotations), strict=True):
+        alone = runtime.capture(view, rotation)
+        for name in ("vpl_position_world", "vpl_flux", "direct_irradiance", "indirect_irradiance"):
+            assert np.array_equal(getattr(captured, name), getattr(alone, name)), name
+
+
+@pytest.mark.parametrize("density_relaxation", [0, 4])
 def test_frames_repeat_bitwise(gl_context, density_relaxation):
     runtime = runtime_with(
         gl_context, vpl_count=64, density_importance=0.7, density_relaxation=density_relaxation

@@ -8,7 +8,6 @@ intervals must cover.
 
 from dataclasses import dataclass
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
@@ -18,13 +17,14 @@ from renderer.artist_parameters import ArtistParameters
 from tuner.fit_views import FitView, fit_view
 from tuner.virtual_point_lights import Receivers, VirtualPointLights
 from tuner.vpl_gather import FalloffParameters, gather
+from tuner.wide_vectors import wide_jit
 
 SIZE = (48, 36)
 """Of each view: 1,728 receivers at most."""
 VIEWS = 2
 VPLS = 32
 
-_gather = jax.jit(gather)
+_gather = wide_jit(gather)
 
 
 @dataclass(frozen=True, eq=False)

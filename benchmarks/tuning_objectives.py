@@ -20,6 +20,7 @@ from tuner.search_space import FALLOFF_SPECS, VISIBILITY_SPECS, SearchSpace
 from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_gather import FalloffParameters, gather
 from tuner.vpl_visibility import VisibilityParameters, map_texels, seen_share, surface_overlap
+from tuner.wide_vectors import wide_jit
 
 Point = np.ndarray
 
@@ -125,7 +126,7 @@ class SurrogateLoss:
         return float(_surrogate_loss(jnp.asarray(point, jnp.float32), self._pairs, self._rest))
 
 
-@jax.jit
+@wide_jit
 def _surrogate_loss(point: jax.Array, pairs: tuple, rest: FalloffParameters) -> jax.Array:
     values = SURROGATE_SPACE.values(point)
     visibility = VisibilityParameters(*(values.pop(spec.name) for spec in VISIBILITY_SPECS))

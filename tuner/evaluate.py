@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import jax
 import numpy as np
 from jaxtyping import Bool, Float32
 
@@ -22,11 +21,12 @@ from tuner.tabulated_gather import Visibility
 from tuner.view_metrics import ViewMetrics, mean_metrics, view_metrics
 from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_gather import FalloffParameters, gather
+from tuner.wide_vectors import wide_jit
 
 VARIANTS = ("default", "tuned", "ceiling")
 SPLITS = ("fitted", "held_out")
 
-_gather = jax.jit(gather)
+_gather = wide_jit(gather)
 
 
 @dataclass(frozen=True, eq=False)

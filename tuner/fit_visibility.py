@@ -27,8 +27,9 @@ from tuner.losses.relative_squared_error import EVEN_SHARE, target_of
 from tuner.reduced_gather import reduce_columns
 from tuner.search_space import VISIBILITY_SPECS, SearchSpace
 from tuner.virtual_point_lights import Receivers, VirtualPointLights, gather_inputs
-from tuner.vpl_gather import FalloffParameters, pair_forms
+from tuner.vpl_gather import FalloffParameters, pair_forms, vpl_axes
 from tuner.vpl_visibility import VisibilityParameters, map_texels, seen_share, surface_overlap
+from tuner.wide_vectors import wide_jit
 
 TURNS = 2
 STARTS = 9
@@ -205,7 +206,7 @@ def _reduced(views: list[_View], parameters: ArtistParameters) -> tuple[ReducedV
     )
 
 
-@jax.jit
+@wide_jit
 def _sums(
     receivers: Receivers,
     vpls: VirtualPointLights,
@@ -213,7 +214,7 @@ def _sums(
     falloff: FalloffParameters,
 ) -> Float[Array, "receivers 3 columns"]:
     """What is always seen, then what is shared out between the nodes, linearly in the logarithm."""
-    squared, form_at = pair_forms(receivers, vpls)
+    squared, form_at = pair_forms(receivers, vpls, vpl_axes(vpls))
     transmittance = jnp.exp(-falloff.falloff_transmittance * jnp.sqrt(squared))
     form = falloff.intensity / jnp.pi * form_at(falloff.falloff_footprint) * transmittance
     step = np.log(_MOST / _LEAST) / (NODES - 1)

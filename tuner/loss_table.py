@@ -20,6 +20,7 @@ from tuner.losses.relative_squared_error import EVEN_SHARE, Target, target_of
 from tuner.virtual_point_lights import Receivers, VirtualPointLights, gather_inputs
 from tuner.vpl_gather import FalloffParameters, gather
 from tuner.vpl_visibility import VisibilityParameters, map_texels, seen_share, surface_overlap
+from tuner.wide_vectors import wide_jit
 
 RECEIVERS = 2048
 """Pixels of a view that a table looks at."""
@@ -71,7 +72,7 @@ def loss_table(
     return LossTable(np.asarray(square), np.asarray(product), np.array(constant, np.float32))
 
 
-@jax.jit
+@wide_jit
 def _sums(
     receivers: Receivers,
     vpls: VirtualPointLights,

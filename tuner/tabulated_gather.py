@@ -20,7 +20,8 @@ from scipy.interpolate import CubicSpline
 
 from renderer.artist_parameters import parameter_spec
 from tuner.virtual_point_lights import Receivers, VirtualPointLights
-from tuner.vpl_gather import FalloffParameters, pair_forms, receivers_at_once
+from tuner.vpl_gather import FalloffParameters, pair_forms, receivers_at_once, vpl_axes
+from tuner.wide_vectors import wide_jit
 
 Visibility = Bool[np.ndarray, "receivers vpls"] | Float[Array, "receivers vpls"]
 """Share of each VPL's light that reaches each receiver, in [0, 1]."""
@@ -114,12 +115,14 @@ def _spline_weights(place: Array, count: int) -> Float[Array, " nodes"]:
     return ((cubic * x + square) * x + linear) * x + constant
 
 
-@jax.jit
+@wide_jit
 def _gather_chunks(
     position: Array, normal: Array, visibility: Array | None, vpls: VirtualPointLights
 ) -> Float[Array, "chunks chunk 3 nodes"]:
+    axes = vpl_axes(vpls)
+
     def gather_chunk(chunk: tuple[Array, Array, Array | None]) -> Array:
-        squared, form_at = pair_forms(Receivers(chunk[0], chunk[1]), vpls)
+        squared, form_at = pair_forms(Receivers(chunk[0], chunk[1]), vpls, axes)
         distance = jnp.sqrt(squared)
         forms = jnp.stack([form_at(jnp.asarray(alpha)) for alpha in _footprint_nodes()], axis=1)
         arriving = jnp.stack([jnp.exp(-kappa * distance) for kappa in _transmittance_nodes()], axis=2)

@@ -1,5 +1,6 @@
 """Loads shaders: `#include`, constants owned by Python, and errors that name the right file and line."""
 
+import hashlib
 import re
 from collections.abc import Mapping
 from importlib import resources
@@ -66,6 +67,17 @@ def read_shader(name: str) -> str:
         return resources.files("shaders").joinpath(name).read_text(encoding="utf-8")
     except OSError as error:
         raise ShaderError(f"shaders/{name}: cannot be read ({error})") from error
+
+
+def shaders_digest() -> str:
+    """Hash of every shader that the runtime may compile: what is measured of them holds for these alone."""
+    digest = hashlib.sha256()
+    folder = resources.files("shaders")
+    parts = (folder, folder.joinpath("common"))
+    for part in parts:
+        for file in sorted((f for f in part.iterdir() if f.is_file()), key=lambda f: f.name):
+            digest.update(f"{file.name}\0".encode() + file.read_bytes() + b"\0")
+    return digest.hexdigest()
 
 
 def load_program(

@@ -19,6 +19,7 @@ from renderer.light_faces import face_count
 from renderer.runtime import FEW_FACES, RSM_RESOLUTION, RSM_RESOLUTION_OF_MANY, Runtime
 from renderer.runtime_options import RuntimeOptions
 from renderer.scene import Scene
+from renderer.shader_library import shaders_digest
 from renderer.tuned_config import TunedConfig
 from renderer.views import View
 from tuner.reference.cache import cache_folder
@@ -157,7 +158,7 @@ def measured_cost_model(
 
 def costs_key(renderer: str, scene: Scene, views: Sequence[View], config: TunedConfig) -> str:
     """Hash of all that a frame's costs depend on."""
-    parts = [_FORMAT, renderer, scene_digest(scene), config.visibility]
+    parts = [_FORMAT, renderer, shaders_digest(), scene_digest(scene), config.visibility]
     parts += [config.parameters.density_importance > 0.0, config.parameters.screen_space_strength > 0.0]
     parts += [config.parameters.density_relaxation]
     for view in views:

@@ -7,9 +7,9 @@ and at few VPLs the best α, k and κ are others than at many.
 
 Over (γ, η) the loss is measured, along one axis after the other, with falloff and maps fitted at every
 candidate: as density shifts, VPLs cross edges and corners, and in a Cornell box one step of 0.05 in seven
-goes against the smooth trend (row `density_slope_agreement` of `vpltune bench density`). What the runtime
-draws with the start's falloff would cost two thirds as much, but where the falloff is what is wrong all
-densities look the same by it: in one room the density that it chose left 1.5 times the relMSE.
+goes against the smooth trend (row `density_slope_agreement` of `vpltune bench density`). Pictures drawn with
+the start's falloff would be cheaper to judge by, but where the falloff is what is wrong all densities look
+alike in them.
 
 Every candidate but the start's own has cells (`density_relaxation`): at few VPLs most of the error is that a
 point shines for all that lies around it, not where shadows fall.

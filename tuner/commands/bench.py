@@ -46,7 +46,8 @@ def _table(rows: list[dict]) -> object:
         ("its value", "right"),
         ("ratio", "right"),
     ):
-        table.add_column(heading, justify=justify)
+        # Names are to be found again, and must not be cut.
+        table.add_column(heading, justify=justify, overflow="fold")
     for row in rows:
         table.add_row(
             row["name"],

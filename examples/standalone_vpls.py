@@ -1,6 +1,7 @@
 """Virtual point lights for standalone_reader.py: rows of position, footprint, normal, 0, flux, 0.
 
 The atlas: what the lights see, texel by texel: position, depth, plane's normal, area, flux, 1.
+Seen: what the camera sees: position, depth, normal, 0, albedo, 1.
 """
 
 import numpy as np
@@ -8,27 +9,69 @@ import numpy as np
 DARK = [*np.zeros(6), 1.0, *np.zeros(5)]
 
 
-def virtual_point_lights(atlas, bundle):
+def virtual_point_lights(atlas, seen, bundle):
     """The VPLs, and the scene's length L: the spread of its light."""
     flux, position = atlas[..., 8:11].mean(-1), atlas[..., :3]
     offset = position - (flux[..., None] * position).sum((0, 1)) / flux.sum()
     length = np.sqrt((flux * (offset**2).sum(-1)).sum() / flux.sum())
-    count, rules = bundle["config"]["parameters"]["vpl_count"], bundle["vpl_cells"]
+    parameters, rules = bundle["config"]["parameters"], bundle["vpl_cells"]
+    weight = np.where(flux > 0, flux ** parameters["density_exponent"], 0)
+    if bundle["vpl_importance"]["cells"] > 0:
+        weight *= importance(atlas, seen, bundle) ** parameters["density_importance"]
+    count = parameters["vpl_count"]
     if rules["steps"] == 0:
-        vpls = drawn(atlas, bundle, count)
+        vpls = drawn(atlas, weight, bundle, count)
     else:
-        samples = drawn(atlas, bundle, rules["samples"])
+        samples = drawn(atlas, weight, bundle, rules["samples"])
         vpls = samples[:count]
         for _ in range(rules["steps"]):
             vpls = relaxed(vpls, samples[samples[:, 3] > 0], length, rules["normal_reach"])
     return vpls.astype("f4"), length
 
 
-def drawn(atlas, bundle, count):
-    """So many VPLs, with chances of flux^gamma."""
+def importance(atlas, seen, bundle):
+    """For each texel, how much error its light would leave on the picture if it were drawn too seldom.
+
+    Cells of 16 texels of the atlas light some points of the picture, without visibility. The chances of least
+    relative error are sqrt(sum of squares of what a point gets from the cell, over what it gets from all).
+    """
+    rules, size = bundle["vpl_importance"], bundle["rsm"]["resolution"]
+    cells, dot = rules["cells"], lambda a, b: (a * b).sum(-1)
+    samples = ((np.arange(4 * cells) + 0.5) / (4 * cells) * size).astype(int)
+    row, column = (np.add.outer(np.arange(0, side, size), samples).ravel() for side in atlas.shape[:2])
+    shape = len(row) // 4, len(column) // 4
+    texels = (
+        atlas[np.ix_(row, column)].reshape(shape[0], 4, shape[1], 4, 12).swapaxes(1, 2).reshape(-1, 16, 12)
+    )
+    flux = texels[..., 8:11].mean(-1)
+    total = np.maximum(flux.sum(1), 1e-30)[:, None]
+    position, normal = ((flux[..., None] * texels[..., i : i + 3]).sum(1) / total for i in (0, 4))
+    straight = np.linalg.norm(normal, axis=1)
+    normal /= np.maximum(straight, 1e-30)[:, None]
+    area = (texels[..., 7] * (flux > 0)).sum(1) * (size / cells / 4) ** 2
+
+    pixels = np.array(seen.shape[1::-1])
+    at = (0.5 + np.arange(1, rules["receivers"] + 1)[:, None] * bundle["point_table"]["steps"]) % 1 * pixels
+    points = seen[tuple(at.astype(int).T[::-1])]
+    points = points[points[:, 11] > 0]
+    to_cell = position - points[:, None, :3]
+    squared = np.maximum(dot(to_cell, to_cell), 1e-30)
+    # Less than a thousandth is a surface's own plane, where rounding says which side.
+    cosines = [dot(points[:, None, 4:7], to_cell), dot(-normal, to_cell)] / np.sqrt(squared) - 1e-3
+    form = np.prod(np.maximum(cosines, 0), axis=0) / (np.pi * squared + rules["spread"] * area)
+    form *= straight > 1e-4
+    received = (form @ total)[:, 0]
+    weight = 1 / (received**2 / (rules["dark_share"] * (received**2).mean()) + 1)
+    missed = np.sqrt(weight @ form**2)
+    share = (missed / missed[missed > 0].mean() + rules["least"]).reshape(shape)
+    row, column = (np.arange(side) * cells // size for side in atlas.shape[:2])
+    return share[np.ix_(row, column)]
+
+
+def drawn(atlas, weight, bundle, count):
+    """So many VPLs, by chances of that weight."""
     rsm, flux = bundle["rsm"], atlas[..., 8:11].mean(-1)
     size, filtering = rsm["resolution"], rsm["filtering"]
-    weight = np.where(flux > 0, flux ** bundle["config"]["parameters"]["density_exponent"], 0)
     in_row, rows = np.cumsum(weight, axis=1), np.cumsum(weight.sum(1))
     x, y = ((0.5 + np.arange(1, count + 1)[:, None] * bundle["point_table"]["steps"]) % 1).T
     row = np.searchsorted(rows, y * rows[-1], "right")

@@ -17,6 +17,7 @@ from renderer.animation import AnimationPlayer
 from renderer.atomic_file import written_whole
 from renderer.camera_uniforms import camera_uniforms
 from renderer.light_faces import FaceSnapping, LightRecords, light_records
+from renderer.passes import vpl_importance
 from renderer.passes.tone_mapping import EXPOSURE_KEY
 from renderer.passes.vpl_cells import LARGEST_COUNT, NORMAL_REACH, sample_count
 from renderer.placed_boxes import placed_boxes
@@ -87,6 +88,7 @@ def scene_bundle(
             "faces": _faces(records, resolution),
         },
         "point_table": {"kind": "r2", "steps": list(R2_STEPS)},
+        "vpl_importance": _vpl_importance(config, count),
         "vpl_cells": _vpl_cells(config),
         "visibility_maps": _visibility_maps(options, config),
         "draws": draws,
@@ -94,6 +96,17 @@ def scene_bundle(
         "arrays": binary.arrays,
     }
     return SceneBundle(document, bytes(binary.content))
+
+
+def _vpl_importance(config: TunedConfig, face_count: int) -> dict[str, Any]:
+    used = config.parameters.density_importance > 0.0
+    return {
+        "cells": vpl_importance.importance_cells(face_count) if used else 0,
+        "receivers": vpl_importance.RECEIVERS,
+        "spread": vpl_importance.SPREAD,
+        "dark_share": vpl_importance.DARK_SHARE,
+        "least": vpl_importance.LEAST_IMPORTANCE,
+    }
 
 
 def _vpls_are_cells(config: TunedConfig) -> bool:
@@ -131,8 +144,6 @@ def left_out(config: TunedConfig) -> tuple[str, ...]:
     sentences = []
     if config.parameters.screen_space_strength > 0.0 and not _vpls_are_cells(config):
         sentences.append("The screen-space near field is drawn by the runtime alone")
-    if config.parameters.density_importance > 0.0:
-        sentences.append("Outside the runtime VPLs are placed by flux alone: the same mean, more noise")
     return tuple(sentences)
 
 

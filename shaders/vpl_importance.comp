@@ -13,8 +13,6 @@ layout(local_size_x = 64) in;
 
 uniform int cell_count;
 
-const float DARK_SHARE = 0.01;  // of the squared mean, as relMSE has it: a black point is not infinitely important
-
 shared vec3 positions[IMPORTANCE_RECEIVERS];
 shared vec4 normals_weights[IMPORTANCE_RECEIVERS];
 
@@ -29,13 +27,11 @@ void main() {
         seen += receiver.position_valid.w;
     }
     // The mean square, not the square of the mean: where few points are lit both keep black ones at bay.
-    float dark = DARK_SHARE * squares / max(seen, 1.0);
+    float dark = IMPORTANCE_DARK_SHARE * squares / max(seen, 1.0);
     for (int i = lane; i < IMPORTANCE_RECEIVERS; i += 64) {
         ImportanceReceiver receiver = importance_receivers[i];
-        float irradiance = receiver.normal_irradiance.w;
-        float weight = dark > 0.0 ? receiver.position_valid.w / (irradiance * irradiance / dark + 1.0) : 0.0;
         positions[i] = receiver.position_valid.xyz;
-        normals_weights[i] = vec4(receiver.normal_irradiance.xyz, weight);
+        normals_weights[i] = vec4(receiver.normal_irradiance.xyz, receiver_weight(receiver, dark));
     }
     barrier();
     int index = int(gl_GlobalInvocationID.x);

@@ -7,10 +7,6 @@ layout(local_size_x = 256) in;
 
 uniform int cell_count;
 
-// Of the mean over the lit cells, added to each: light that matters little, or is taken to, is drawn seldom and
-// not never, so that sums stay right in the mean and no VPL grows too bright.
-const float LEAST_IMPORTANCE = 0.05;
-
 shared vec2 sums[256];
 
 void main() {

@@ -20,9 +20,7 @@ void main() {
     Receiver receiver = gbuffer_receiver(min(ivec2(place * vec2(size)), size - 1));
     float irradiance = 0.0;
     for (int i = lane; i < cell_count; i += 64) {
-        ImportanceCell cell = importance_cells[i];
-        irradiance += cell.position_flux.w > 0.0
-            ? cell.position_flux.w * cell_form(receiver.position_world, receiver.normal_world, cell) : 0.0;
+        irradiance += cell_irradiance(receiver.position_world, receiver.normal_world, importance_cells[i]);
     }
     sums[lane] = irradiance;
     barrier();

@@ -121,26 +121,22 @@ def test_a_shipped_scene_by_the_command_line(tmp_path, capfd, name, visibility):
     assert np.abs(picture - ours).max() <= 1
 
 
-@pytest.mark.parametrize("light", ["spot", "point", "directional"])
-def test_cells_shine_as_discs(tmp_path, light):
-    parameters = dataclasses.replace(
-        CONFIG.parameters, vpl_count=32, density_relaxation=8, falloff_footprint=CELL_FOOTPRINT
-    )
-    scene, view, config = (
-        textured_room(),
-        room_view(light, (96, 72)),
-        TunedConfig(parameters, visibility="maps"),
-    )
-    write_bundle(tmp_path, scene_bundle(scene, view, config, rsm_resolution=256))
+@pytest.mark.parametrize("light", ["point", "directional"])
+@pytest.mark.parametrize("placement", [{"density_relaxation": 8}, {"density_importance": 0.7}], ids=str)
+def test_few_vpls_are_placed_as_the_runtime_places_them(tmp_path, light, placement):
+    """As cells, which shine as discs, or by what the camera sees."""
+    plain = dataclasses.replace(CONFIG.parameters, vpl_count=32, falloff_footprint=CELL_FOOTPRINT)
+    parameters = dataclasses.replace(plain, **placement)
+    scene, view = textured_room(), room_view(light, (96, 72))
+    bundle = scene_bundle(scene, view, TunedConfig(parameters, visibility="maps"), rsm_resolution=256)
+    write_bundle(tmp_path, bundle)
     picture, _ = read_picture(tmp_path, tmp_path / "picture.png")
-    ours, points = (
-        renderer.Runtime(scene, TunedConfig(form, visibility="maps"), rsm_resolution=256)
-        .render(view)
-        .astype(int)
-        for form in (parameters, dataclasses.replace(parameters, density_relaxation=0))
+    ours, others = (
+        renderer.Runtime(scene, TunedConfig(form, visibility="maps"), rsm_resolution=256).render(view)
+        for form in (parameters, plain)
     )
-    assert (np.abs(picture - ours).max(axis=-1) > 1).mean() < 1e-3
-    assert (np.abs(picture - points).max(axis=-1) > 3).mean() > 0.1
+    assert (np.abs(picture - ours.astype(int)).max(axis=-1) > 1).mean() < 1e-3
+    assert (np.abs(picture - others.astype(int)).max(axis=-1) > 3).mean() > 0.1
 
 
 @pytest.mark.parametrize("file", sorted(READER.parent.glob("standalone_*")), ids=lambda file: file.name)

@@ -18,6 +18,19 @@ RECEIVERS = 128
 SPREAD = 16.0
 """Times a cell's area over which its light is spread: about a VPL's own, where there are a few hundred. At a
 quarter and at four times it, the error of 32 VPLs was the same within its noise."""
+DARK_SHARE = 0.01
+"""Of the squared mean irradiance, as relMSE has it: a black point is not infinitely important."""
+LEAST_IMPORTANCE = 0.05
+"""Of the mean over the lit cells, added to each: light that matters little, or is taken to, is drawn seldom
+and not never, so that sums stay right in the mean and no VPL grows too bright."""
+DEFINES = {
+    "IMPORTANCE_RECEIVERS": RECEIVERS,
+    "IMPORTANCE_SPREAD": SPREAD,
+    "IMPORTANCE_DARK_SHARE": DARK_SHARE,
+    "LEAST_IMPORTANCE": LEAST_IMPORTANCE,
+    "R2_STEP_X": R2_STEPS[0],
+    "R2_STEP_Y": R2_STEPS[1],
+}
 
 _CELL_BYTES = 32
 _RECEIVER_BYTES = 32
@@ -41,12 +54,9 @@ class VplImportancePass:
         self._cell_count = rsm.face_count * cells**2
         defines = {
             **buffer_bindings.DEFINES,
+            **DEFINES,
             "RSM_RESOLUTION": rsm.resolution,
             "IMPORTANCE_CELLS": cells,
-            "IMPORTANCE_RECEIVERS": RECEIVERS,
-            "IMPORTANCE_SPREAD": SPREAD,
-            "R2_STEP_X": R2_STEPS[0],
-            "R2_STEP_Y": R2_STEPS[1],
         }
         self._cells = load_compute(context, "vpl_importance_cells", defines)
         self._receivers = load_compute(context, "vpl_importance_receivers", defines)

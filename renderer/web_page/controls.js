@@ -44,9 +44,10 @@ class Page {
 
   step() {
     this.asked = 0;
-    const { vpl_count } = this.parameters;
-    if (this.lightChanged) this.frame.drawLights(this, this.parameters);
+    const { vpl_count, density_importance } = this.parameters;
+    if (this.lightChanged) this.frame.drawLights(this);
     if (this.cameraChanged) this.frame.drawCamera(this.camera);
+    if (this.lightChanged || (this.cameraChanged && density_importance > 0)) this.frame.drawVpls(this, this.parameters);
     this.lightChanged = this.cameraChanged = false;
     if (this.gathered < vpl_count) {
       const end = Math.min(this.gathered + BATCH, vpl_count);

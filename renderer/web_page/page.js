@@ -1,6 +1,7 @@
 "use strict";
 // Draws the exported scene as the runtime does: G-buffer, RSM, VPLs, gather, direct light, tone curve. VPLs are made
-// anew only when the light moves; they are gathered a batch at a time, so that a slow machine stays answerable.
+// anew only when the light moves, or the camera where they are placed by what it sees; they are gathered a batch at a
+// time, so that a slow machine stays answerable.
 
 const bundle = JSON.parse(document.getElementById("bundle").textContent);
 const shaders = JSON.parse(document.getElementById("shaders").textContent);
@@ -276,6 +277,12 @@ class Frame {
       this.moments.push(makeTarget(w, h, ["RGBA32F", "R32F"]));
     }
     const most = bundle.config.parameters.vpl_count;
+    if (this.programs.vpl_importance) {
+      const [width, height] = [columns, rows].map((texels) => (texels / bundle.rsm.resolution) * bundle.vpl_importance.cells);
+      this.importanceCells = makeTarget(width, height, ["RGBA32F", "RGBA32F"]);
+      this.importanceReceivers = makeTarget(bundle.vpl_importance.receivers, 1, ["RGBA32F", "RGBA32F"]);
+      [this.importance, this.meanImportance] = [makeTarget(width, height, ["R32F"]), makeTarget(1, 1, ["R32F"])];
+    }
     const vplTarget = (count, formats = ["RGBA32F", "RGBA32F", "RGBA32F"]) =>
       makeTarget(bundle.vpl_columns, Math.ceil(count / bundle.vpl_columns), formats);
     this.vpls = vplTarget(most);
@@ -348,8 +355,7 @@ class Frame {
     return { gbuffer_normal, gbuffer_albedo, gbuffer_depth, camera_to_world: camera, tan_half_fov, near_plane };
   }
 
-  // RSMs, and the VPLs that are drawn from them.
-  drawLights(state, parameters) {
+  drawLights(state) {
     lightBlocks(state.lights, state.faces).forEach((block, i) => {
       gl.bindBuffer(gl.UNIFORM_BUFFER, this.blocks[i]);
       gl.bufferData(gl.UNIFORM_BUFFER, block, gl.DYNAMIC_DRAW);
@@ -366,6 +372,11 @@ class Frame {
       drawScene(this.scene, this.programs.reflective_shadow_map, light_to_world, extent, orthographic, values);
       gl.disable(gl.SCISSOR_TEST);
     });
+  }
+
+  // VPLs by the light that is seen in the RSM, and by what the camera sees.
+  drawVpls(state, parameters) {
+    if (this.importance && parameters.density_importance > 0) this.measureImportance(state.camera);
     this.sumWeights(state, parameters);
     const { vpl_count, density_relaxation } = parameters;
     this.vplsAreCells = Boolean(this.samples) && density_relaxation > 0;
@@ -374,10 +385,27 @@ class Frame {
     if (this.visibility) this.castVisibility(vpl_count);
   }
 
+  // A factor of the chance to draw each cell of the RSM, before its power is taken: what the camera would miss.
+  measureImportance(camera) {
+    const { vpl_importance_cells, vpl_importance_receivers, vpl_importance, vpl_importance_mean } = this.programs;
+    fill(this.importanceCells, vpl_importance_cells, this.rsmValues);
+    const [cell_position_flux, cell_normal_area] = this.importanceCells.textures;
+    const cells = { cell_position_flux, cell_normal_area };
+    fill(this.importanceReceivers, vpl_importance_receivers, { ...this.cameraValues(camera), ...cells });
+    const [receiver_position_valid, receiver_normal_irradiance] = this.importanceReceivers.textures;
+    fill(this.importance, vpl_importance, { ...cells, receiver_position_valid, receiver_normal_irradiance });
+    fill(this.meanImportance, vpl_importance_mean, { importance: this.importance.textures[0] });
+  }
+
+  weightValues({ density_exponent, density_importance }) {
+    const [importance, mean_importance] = [this.importance, this.meanImportance].map((target) => target?.textures[0]);
+    return { ...this.rsmValues, density_exponent, density_importance, importance, mean_importance };
+  }
+
   // So many VPLs, which share all light among them.
-  placeVpls(target, { density_exponent }, vpl_count) {
+  placeVpls(target, parameters, vpl_count) {
     const sums = { sums_in_rows: this.sumsInRows, sums_of_rows: this.sumsOfRows, rows: bundle.rsm.atlas[0], vpl_count };
-    const values = { ...this.rsmValues, ...sums, density_exponent, point_table: this.pointTable };
+    const values = { ...this.weightValues(parameters), ...sums, point_table: this.pointTable };
     fill(target, this.programs.virtual_point_lights, values);
   }
 
@@ -402,9 +430,8 @@ class Frame {
   }
 
   sumWeights(state, parameters) {
-    const { density_exponent } = parameters;
     const moment_origin = column(state.faces[0].light_to_world, 3);
-    fill(this.weights, this.programs.vpl_weights, { ...this.rsmValues, density_exponent, moment_origin });
+    fill(this.weights, this.programs.vpl_weights, { ...this.weightValues(parameters), moment_origin });
     const [rows, columns] = bundle.rsm.atlas;
     this.sumsInRows = this.runningSum(this.weights.textures[0], this.sums, columns, [1, 0]);
     fill(this.totals[1], this.programs.running_sum, { values: this.sumsInRows, reach: [0, 0], first: [columns - 1, 0] });

@@ -13,6 +13,7 @@ from renderer import vpl_disc_bounds
 from renderer.artist_parameters import ARTIST_PARAMETERS
 from renderer.bounding_volumes import COUNT_BITS, LEAF_ITEMS, NODE_DTYPE, build_bounding_volumes
 from renderer.errors import InputError
+from renderer.passes import vpl_importance
 from renderer.passes.tone_mapping import EXPOSURE_KEY
 from renderer.scene_bundle import SceneBundle
 from renderer.shader_library import Define, ShaderSource
@@ -41,6 +42,12 @@ _SHADERS = (
     "web/tone_mapping.frag",
 )
 _CELL_SHADERS = ("web/vpl_cells_owners.frag", "web/vpl_cells.frag", "web/vpl_gather_cells.frag")
+_IMPORTANCE_SHADERS = (
+    "web/vpl_importance_cells.frag",
+    "web/vpl_importance_receivers.frag",
+    "web/vpl_importance.frag",
+    "web/vpl_importance_mean.frag",
+)
 _MAP_SHADERS = ("web/vpl_visibility_maps.frag",)
 _DETAIL_SHADERS = ("web/vpl_visibility_edges.frag", "web/vpl_visibility_details.frag")
 _HEADER = """#version 300 es
@@ -61,7 +68,6 @@ def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
     if not bundle.document["lights"]:
         raise InputError("web page: the view must have a light")
     defines = _defines(bundle.document)
-    cells = bundle.document["vpl_cells"]["steps"] > 0
     binary = bundle.binary
     arrays = {name: at for name, at in bundle.document["arrays"].items() if name not in ("lights", "faces")}
     if defines["VISIBILITY_MAP_SIZE"]:
@@ -82,7 +88,7 @@ def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
         "STYLE": _text("page.css"),
         "DOCUMENT": _json(document),
         "BINARY": base64.b64encode(zlib.compress(binary, 9)).decode("ascii"),
-        "SHADERS": _json(_shaders(defines, cells)),
+        "SHADERS": _json(_shaders(bundle.document, defines)),
         "SCRIPT": _text("page.js") + _text("controls.js"),
     }
     page = _text("page.html")
@@ -109,6 +115,8 @@ def _defines(document: dict[str, Any]) -> dict[str, Define]:
         "EXPOSURE_KEY": EXPOSURE_KEY,
         "NORMAL_REACH": document["vpl_cells"]["normal_reach"],
         **vpl_disc_bounds.DEFINES,
+        **vpl_importance.DEFINES,
+        "IMPORTANCE_CELLS": document["vpl_importance"]["cells"],
     }
 
 
@@ -135,10 +143,12 @@ def _whole_rows(values: np.ndarray) -> np.ndarray:
     return np.concatenate([values, np.zeros(rows * 4 * DATA_COLUMNS - len(values), values.dtype)])
 
 
-def _shaders(defines: dict[str, Define], cells: bool) -> dict[str, str]:
+def _shaders(document: dict[str, Any], defines: dict[str, Define]) -> dict[str, str]:
     names = _SHADERS
-    if cells:
+    if document["vpl_cells"]["steps"] > 0:
         names += _CELL_SHADERS
+    if defines["IMPORTANCE_CELLS"]:
+        names += _IMPORTANCE_SHADERS
     if defines["VISIBILITY_MAP_SIZE"]:
         names += _MAP_SHADERS
         if defines["VISIBILITY_MAP_REFINEMENT"] > 1:

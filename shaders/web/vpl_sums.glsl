@@ -4,6 +4,11 @@ uniform sampler2D sums_of_rows;   // one column: running sums of the rows' total
 uniform int vpl_count;
 uniform int rows;
 uniform float density_exponent;
+#if IMPORTANCE_CELLS > 0
+uniform float density_importance;
+uniform sampler2D importance;       // of the light in each cell of the atlas
+uniform sampler2D mean_importance;  // one texel
+#endif
 
 float sum_in_row(int row, int column) {
     return texelFetch(sums_in_rows, ivec2(column, row), 0).r;
@@ -14,7 +19,15 @@ float sum_of_rows(int row) {
 }
 
 float sampling_weight(ivec2 texel, float flux) {
-    return pow(flux, density_exponent);
+    float weight = pow(flux, density_exponent);
+#if IMPORTANCE_CELLS > 0
+    if (density_importance > 0.0) {
+        float mean = texelFetch(mean_importance, ivec2(0), 0).r;
+        float own = texelFetch(importance, texel * IMPORTANCE_CELLS / RSM_RESOLUTION, 0).r;
+        weight *= pow((mean > 0.0 ? own / mean : 1.0) + LEAST_IMPORTANCE, density_importance);
+    }
+#endif
+    return weight;
 }
 
 #define total_weight sum_of_rows(rows - 1)

@@ -103,8 +103,10 @@ def main(folder, output):
     numbers |= {"scene_length": length, "face_size": rsm["resolution"], "cells": cells["steps"]}
     numbers |= cells["disc"] | maps
     if maps["map_room"] > 0:
-        context.compute_shader(shader("CASTING", numbers.items())).run(len(vpls))
-        context.memory_barrier()
+        texels = maps["map_size"] ** 2
+        for stage, groups in (("CASTING", maps["map_size"]), ("MARKING", 1), ("REFINING", texels)):
+            context.compute_shader(shader(stage, numbers.items())).run(len(vpls), groups)
+            context.memory_barrier()
     depths = context.texture(atlas.shape[1::-1], 1, atlas[..., 3].astype("f4").tobytes(), dtype="f4")
     for unit, texture in enumerate([*pictures, depths]):
         texture.use(unit)

@@ -1,10 +1,10 @@
 // The visibility maps of standalone_reader.py. CASTING sends rays from every VPL, one through each texel of a small
 // map of its hemisphere, against every triangle: short, not fast. Where what one texel met hides what its neighbour
-// met, a block of finer texels takes its place. LIGHTING asks the map what the VPL sees on the way to a pixel. The
-// program defines the config's parameters, scene_length, map_size (texels along the side, or 0), map_refinement
-// (texels along the side of a block) and map_blocks (for how many there is room).
+// met, MARKING puts a block of finer texels in its place, and REFINING casts those. LIGHTING asks the map what the VPL
+// sees on the way to a pixel. The program defines the config's parameters, scene_length, map_size (texels along the
+// side, or 0), map_refinement (texels along the side of a block) and map_blocks (for how many there is room).
 
-#if defined(CASTING) || defined(LIGHTING)
+#if defined(CASTING) || defined(MARKING) || defined(REFINING) || defined(LIGHTING)
 layout(std430, binding = 4) readonly buffer Vpls { vec4 vpls[]; };  // position, footprint; normal; flux
 // What a ray met: normal, distance; or -1 - the number of a block. Blocks lie after the maps of all VPLs.
 layout(std430, binding = 5) coherent buffer Maps { vec4 maps[]; };
@@ -37,8 +37,7 @@ float overlap(vec3 end, vec3 plane, vec3 hidden, vec3 hidden_normal) {
 }
 #endif
 
-#ifdef CASTING
-layout(local_size_x = 64) in;
+#if defined(CASTING) || defined(REFINING)
 layout(std430, binding = 2) readonly buffer Positions { float positions[]; };
 layout(std430, binding = 3) readonly buffer Triangles { uint triangles[]; };
 
@@ -47,7 +46,10 @@ vec3 corner(int i) {
     return vec3(positions[first], positions[first + 1u], positions[first + 2u]);
 }
 
-vec4 met_by(vec3 origin, vec3 ray) {
+// What a VPL's ray through a texel meets. One ray in each invocation: Mesa's llvmpipe ends loops when an invocation has
+// gone through 65,535 rounds of them.
+vec4 met_along(int vpl, ivec2 texel, int size) {
+    vec3 origin = map_origin(vpl), ray = map_frame(vpls[vpl + 1].xyz) * map_axis(texel, size);
     // A ray that meets nothing ends far outside, at a wall that faces it: no pixel is behind it.
     vec4 met = vec4(-ray, 1e6 * scene_length);
     for (int i = 0; i < triangles.length(); i += 3) {  // Möller and Trumbore 1997
@@ -62,7 +64,35 @@ vec4 met_by(vec3 origin, vec3 ray) {
     }
     return met;
 }
+#endif
 
+#ifdef CASTING
+layout(local_size_x = map_size) in;
+
+void main() {
+    ivec2 texel = ivec2(gl_LocalInvocationID.x, gl_WorkGroupID.y);
+    int vpl = int(gl_WorkGroupID.x);
+    maps[vpl * map_texels + texel.y * map_size + texel.x] = met_along(3 * vpl, texel, map_size);
+}
+#endif
+
+#ifdef REFINING
+layout(local_size_x = map_refinement, local_size_y = map_refinement) in;
+
+void main() {
+    ivec2 coarse = ivec2(gl_WorkGroupID.y % map_size, gl_WorkGroupID.y / map_size);
+    ivec2 inside = ivec2(gl_LocalInvocationID.xy);
+    int vpl = int(gl_WorkGroupID.x);
+    float number = maps[vpl * map_texels + int(gl_WorkGroupID.y)].w;
+    if (number < 0.0) {
+        vec4 met = met_along(3 * vpl, coarse * map_refinement + inside, map_size * map_refinement);
+        maps[block_start(-1.0 - number) + inside.y * map_refinement + inside.x] = met;
+    }
+}
+#endif
+
+#ifdef MARKING
+layout(local_size_x = 64) in;
 layout(std430, binding = 6) buffer Counted { uint counted; };
 shared bool is_edge[map_texels];
 
@@ -74,13 +104,7 @@ bool hides(ivec2 texel, ivec2 other, int start, mat3 frame) {
 
 void main() {
     int vpl = 3 * int(gl_WorkGroupID.x), start = vpl / 3 * map_texels, lane = int(gl_LocalInvocationID.x);
-    vec3 origin = map_origin(vpl);
     mat3 frame = map_frame(vpls[vpl + 1].xyz);
-    for (int i = lane; i < map_texels; i += 64) {
-        maps[start + i] = met_by(origin, frame * map_axis(ivec2(i % map_size, i / map_size), map_size));
-    }
-    memoryBarrierBuffer();
-    barrier();
     for (int i = lane; i < map_texels; i += 64) {
         ivec2 texel = ivec2(i % map_size, i / map_size);
         is_edge[i] = false;
@@ -92,12 +116,7 @@ void main() {
     barrier();
     for (int i = lane; i < map_texels; i += 64) {
         uint block = is_edge[i] ? atomicAdd(counted, 1u) : uint(map_blocks);
-        if (block >= uint(map_blocks)) { continue; }
-        maps[start + i].w = -1.0 - float(block);
-        for (int k = 0; k < block_texels; ++k) {
-            ivec2 texel = ivec2(i % map_size, i / map_size) * map_refinement + ivec2(k % map_refinement, k / map_refinement);
-            maps[block_start(float(block)) + k] = met_by(origin, frame * map_axis(texel, map_size * map_refinement));
-        }
+        if (block < uint(map_blocks)) { maps[start + i].w = -1.0 - float(block); }
     }
 }
 #endif

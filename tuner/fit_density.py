@@ -43,12 +43,12 @@ RELAXATION = 8
 """Steps towards the middles of cells (rows `relaxation_…` of `vpltune bench density`)."""
 CELL_FOOTPRINT = 1.0
 """α where a fit of cells begins: discs as wide as their cells. Points do best at about half of that."""
-_IMPORTANCES = (0.25, 0.5, 0.75, 1.0)
-"""Of η, at γ = 1. That of 0 is as a rule the start's."""
+_IMPORTANCES = (0.0, 0.5, 1.0)
+"""Of η, at γ = 1; one more between the middle and the better end."""
 _EXPONENTS = (0.75, 0.5, 0.25, 0.0)
 """Of γ, at the best η, for as long as the loss falls."""
-_TRIALS = len(_IMPORTANCES) + 2
-"""As a rule: the start's own, those of η, one of γ."""
+_TRIALS = len(_IMPORTANCES) + 3
+"""As a rule: the start's own, four of η, one of γ."""
 _VIEW_SHIFT = (math.sqrt(2.0) - 1.0, math.sqrt(3.0) - 1.0)
 """From a view's rotations to those of the next. R2's own step would give the same points but one."""
 
@@ -171,8 +171,9 @@ def fit_density(
     if own.status.nothing_fitted:
         # Nothing lit, or not finite: no density will mend it.
         return result()
-    for importance in _IMPORTANCES:
-        measure((1.0, importance, RELAXATION))
+    low, middle, high = _IMPORTANCES
+    losses = [measure((1.0, importance, RELAXATION)).loss for importance in _IMPORTANCES]
+    measure((1.0, (middle + (low if losses[0] < losses[-1] else high)) / 2.0, RELAXATION))
     importance = best()[1]
     for exponent in _EXPONENTS:
         measure((exponent, importance, RELAXATION))

@@ -74,7 +74,8 @@ def light_maps(surfaces, rsm):  # an atlas of position, depth, plane's normal, a
 
 def displayed(radiance, key):
     """Exposed to a mean luminance of `key`, Khronos PBR Neutral tone curve, sRGB; top row first."""
-    exposure = key * radiance[..., 3].sum() / (radiance[..., :3] @ [0.2126, 0.7152, 0.0722]).sum()
+    luminance = (radiance[..., :3] @ [0.2126, 0.7152, 0.0722]).sum()
+    exposure = key * radiance[..., 3].sum() / max(luminance, 1e-30)
     color = exposure * radiance[::-1, :, :3]
     low = color.min(-1, keepdims=True)
     color -= np.where(low < 0.08, low - 6.25 * low**2, 0.04)

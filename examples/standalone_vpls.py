@@ -12,6 +12,8 @@ DARK = [*np.zeros(6), 1.0, *np.zeros(5)]
 def virtual_point_lights(atlas, seen, bundle):
     """The VPLs, and the scene's length L: the spread of its light."""
     flux, position = atlas[..., 8:11].mean(-1), atlas[..., :3]
+    if not flux.any():
+        return np.tile(DARK, (bundle["config"]["parameters"]["vpl_count"], 1)).astype("f4"), 1.0
     offset = position - (flux[..., None] * position).sum((0, 1)) / flux.sum()
     length = np.sqrt((flux * (offset**2).sum(-1)).sum() / flux.sum())
     parameters, rules = bundle["config"]["parameters"], bundle["vpl_cells"]
@@ -54,6 +56,8 @@ def importance(atlas, seen, bundle):
     at = (0.5 + np.arange(1, rules["receivers"] + 1)[:, None] * bundle["point_table"]["steps"]) % 1 * pixels
     points = seen[tuple(at.astype(int).T[::-1])]
     points = points[points[:, 11] > 0]
+    if not len(points):
+        return np.ones(atlas.shape[:2])
     to_cell = position - points[:, None, :3]
     squared = np.maximum(dot(to_cell, to_cell), 1e-30)
     # Less than a thousandth is a surface's own plane, where rounding says which side.

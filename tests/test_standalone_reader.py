@@ -13,7 +13,7 @@ from PIL import Image
 
 import renderer
 from renderer.artist_parameters import ArtistParameters
-from renderer.scene import Texture
+from renderer.scene import Texture, look_at
 from renderer.scene_bundle import scene_bundle, write_bundle
 from renderer.tuned_config import TunedConfig
 from tuner.__main__ import run
@@ -99,6 +99,34 @@ def test_several_lights_share_the_vpls(tmp_path):
     picture, _ = read_picture(tmp_path, tmp_path / "picture.png")
     ours = renderer.Runtime(scene, CONFIG, rsm_resolution=128).render(view)
     assert (np.abs(picture.astype(int) - ours).max(axis=-1) > 1).mean() < 1e-3
+
+
+@pytest.mark.parametrize("turned", ["light", "camera"])
+def test_nothing_lit_or_nothing_seen_is_black(tmp_path, turned):
+    """Few VPLs, placed by all that there is to place them by."""
+    parameters = dataclasses.replace(
+        CONFIG.parameters, vpl_count=8, density_importance=0.7, density_relaxation=2
+    )
+    scene, view, config = (
+        colored_room(),
+        room_view("spot", (32, 24)),
+        TunedConfig(parameters, visibility="maps"),
+    )
+    # Beyond all walls, and on outwards.
+    outside = look_at(np.array([0.0, 0.0, 1e3]), np.array([0.0, 0.0, 2e3]))
+    if turned == "light":
+        light = dataclasses.replace(
+            view.lights[0], position_world=outside[:3, 3], direction_world=-outside[:3, 2]
+        )
+        view = dataclasses.replace(view, lights=(light,))
+    else:
+        view = dataclasses.replace(view, camera=dataclasses.replace(view.camera, to_world=outside))
+    write_bundle(tmp_path, scene_bundle(scene, view, config, rsm_resolution=64))
+    picture, said = read_picture(tmp_path, tmp_path / "picture.png")
+    ours = renderer.Runtime(scene, config, rsm_resolution=64).render(view)
+    assert said == ""
+    assert not picture.any()
+    assert not ours.any()
 
 
 @pytest.mark.parametrize(

@@ -217,7 +217,7 @@ def _sums(
 ) -> Float[Array, "receivers 3 columns"]:
     """What is always seen, then what is shared out between the nodes, linearly in the logarithm.
 
-    As one product for each receiver: a pass over all pairs for each node took twice as long.
+    As one product for each receiver, which is sooner than a pass over all pairs for each node.
     """
     count = receivers.position.shape[0]
     chunk_size = min(receivers_at_once(vpls.position.shape[0], PAIRS_AT_ONCE), max(count, 1))

@@ -95,8 +95,8 @@ def pair_forms(
 
     Args:
         receivers, vpls: in units of L.
-        axes: `vpl_axes(vpls)`, made outside of any loop over receivers: picking axes out of [vpls, 3] again
-            for every few pairs took a fifth of a gather.
+        axes: `vpl_axes(vpls)`, made outside of any loop over receivers, which would pick axes out of
+            [vpls, 3] again for every few pairs.
     """
     squared = facing = height = between = jnp.zeros(())
     for axis in range(3):
@@ -154,8 +154,8 @@ def _picture(structure: PyTreeDef, footprint: Array, transmittance: Array, *scen
 def _picture_jvp(
     structure: PyTreeDef, primals: tuple[Array, ...], tangents: tuple[Array | SymbolicZero, ...]
 ) -> tuple[Array, Array]:
-    """What α and κ do to the picture is one more gather each: reverse mode through every pair took twice as
-    long as all three, and twelve times for discs."""
+    """What α and κ do to the picture is one more gather each. Reverse mode through every pair takes longer
+    than all three, most of all for discs."""
     moving = [index for index, tangent in enumerate(tangents) if not isinstance(tangent, SymbolicZero)]
     if any(index > 1 for index in moving):
         # The scene moves as well.

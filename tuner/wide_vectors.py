@@ -1,8 +1,8 @@
 """Loops over pairs of receivers and VPLs, compiled for the widest vectors that the processor has.
 
-LLVM stays at 256 bits where a processor has 512, for the sake of code that seldom needs them. The gather of
-points is 1.7 times as fast with all of them, its gradient and that of discs 1.5 times; what picks texels of
-maps, or sums with hardly any arithmetic, is not.
+LLVM stays at 256 bits where a processor has 512, for the sake of code that seldom needs them. The gather, its
+gradient and discs are faster with all of them; what picks texels of maps, or sums with hardly any arithmetic,
+is not.
 """
 
 from collections.abc import Callable

@@ -35,7 +35,7 @@ from tuner.fit_density import (
     table_rotations,
     with_cells,
 )
-from tuner.fit_falloff import fit_falloff
+from tuner.fit_placement import PlacementFit, fit_placement
 from tuner.prepare_scene import PreparedScene, SceneOptions, Stopwatch, prepare_scene
 
 SCENES = (
@@ -175,7 +175,7 @@ def measured_curves(name: str, path: Path, progress: Progress) -> SceneCurves:
     for index, count in enumerate(COUNTS):
         progress(f"{name}: {count} VPLs", index / len(COUNTS))
         drawn = replace(found, vpl_count=count)
-        tuned = fit_falloff(rotated_views(runtime, fitted_views, drawn, rotations), drawn)[0]
+        tuned = _fit(rotated_views(runtime, fitted_views, drawn, rotations), drawn).parameters
         fits[count] = tuned
         for variant, parameters in (*_UNFITTED.items(), ("fitted", tuned)):
             curves[variant][count] = _error(runtime, views, replace(parameters, vpl_count=count))
@@ -259,7 +259,7 @@ def slope_row(name: str, path: Path, progress: Progress) -> Row:
         progress(f"{name}: slopes", index / len(places))
         candidate = ArtistParameters(vpl_count=FITTED_COUNT, density_importance=float(importance))
         losses.append(
-            fit_falloff(rotated_views(runtime, fitted_views, candidate, rotations), candidate)[1].loss
+            _fit(rotated_views(runtime, fitted_views, candidate, rotations), candidate).descent.loss
         )
     trend = np.polynomial.Polynomial.fit(places, losses, 2)
     agree = np.mean(np.sign(np.diff(losses)) == np.sign(np.diff(trend(places))))
@@ -324,3 +324,8 @@ def _main(names: Sequence[str]) -> None:
 
 if __name__ == "__main__":
     _main(sys.argv[1:])
+
+
+def _fit(views: Sequence[CapturedView], start: ArtistParameters) -> PlacementFit:
+    """The least relMSE: one measure for all densities and counts."""
+    return fit_placement(views, start)

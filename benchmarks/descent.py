@@ -19,8 +19,9 @@ from benchmarks.scene_library import present_scenes
 from renderer.artist_parameters import ArtistParameters
 from renderer.tuned_config import TunedConfig
 from tuner.descent import Residuals
-from tuner.fit_falloff import Data, all_residuals, fit_to, fit_views
-from tuner.fit_views import FitView
+from tuner.fit_falloff import Data, all_residuals, fit_to
+from tuner.fit_placement import fit_placement
+from tuner.fit_views import FitView, robust_errors
 from tuner.prepare_scene import SceneOptions, Stopwatch, prepare_scene
 from tuner.search_space import SearchSpace
 
@@ -42,7 +43,8 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
         prepared = prepare_scene(path, SceneOptions(), TunedConfig(), Stopwatch(), lambda *_: None)
         fitted = tuple(view for view in prepared.views if view.view.split == "fitted")
         if any(view.lit for view in fitted):
-            made += scene_rows(name, fit_views(fitted, ArtistParameters()))
+            ready = fit_placement(fitted, ArtistParameters(), robust_errors(fitted), turns=1).views
+            made += scene_rows(name, ready)
     progress("descent", 1.0)
     shares, steps = ([row for row in made if row.name.startswith(kind)] for kind in ("reached", "steps"))
     return [

@@ -170,7 +170,7 @@ def _ours(problem: _Problem) -> tuple[Trace, list[ArtistParameters]]:
         problem.runtime.frames = 0
         started = time.perf_counter()
         fit = fit_density(
-            problem.runtime, problem.views, problem.base, rotations=problem.rotations, even_share=0.0
+            problem.runtime, problem.views, problem.base, rotations=problem.rotations, robust=False
         )
         seconds.append(time.perf_counter() - started)
     trace, point, frames = Trace(), SPACE.point(fit.parameters), problem.runtime.frames

@@ -116,7 +116,7 @@ class SurrogateLoss:
         self._rest = FalloffParameters.of(rest)
         pairs = []
         for view in views:
-            receivers, vpls = gather_inputs(view.captured, view.fitted_pixels(view.valid.size, 0))
+            receivers, vpls = gather_inputs(view.captured, view.usable_pixels())
             assert view.captured.visibility_maps is not None, "captured without visibility maps"
             overlap = surface_overlap(receivers, vpls, map_texels(view.captured.visibility_maps))
             pairs.append((receivers, vpls, overlap, _target(view)))
@@ -140,7 +140,7 @@ def _surrogate_loss(point: jax.Array, pairs: tuple, rest: FalloffParameters) -> 
 
 def _target(view: CapturedView) -> Target:
     halves = (half[view.valid] for half in (view.reference.irradiance_a, view.reference.irradiance_b))
-    return target_of(*halves, even_share=0.0)
+    return target_of(*halves)
 
 
 class CappedObjective:

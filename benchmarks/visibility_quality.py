@@ -27,10 +27,11 @@ from renderer.runtime_options import RuntimeOptions
 from renderer.tuned_config import TunedConfig, Visibility
 from tuner.captured_view import CapturedView, capture_views, runtime_irradiance
 from tuner.evaluate import SPLITS, surrogate_irradiance
-from tuner.fit_falloff import fit_falloff, fit_to, fit_views
-from tuner.fit_visibility import fit_visibility
+from tuner.fit_placement import fit_placement
+from tuner.fit_views import robust_errors
 from tuner.prepare_scene import PreparedScene, SceneOptions, Stopwatch, prepare_scene
 from tuner.reference import ray_traced_visibility
+from tuner.search_space import held_for
 from tuner.view_metrics import mean_metrics, view_metrics
 
 VPLS = 256
@@ -65,7 +66,8 @@ def scene_figures(path: Path) -> Figures:
     figures[UNREFINED] = _drawn_figures(_unrefined(prepared))
     seen = {view.view.name: ray_visibility(prepared, view) for view in prepared.views}
     fitted = _of_fitted(prepared.views)
-    tuned, _ = fit_falloff(fitted, DEFAULT, visibility=tuple(seen[view.view.name] for view in fitted))
+    of_rays = [seen[view.view.name] for view in fitted]
+    tuned = fit_placement(fitted, DEFAULT, robust_errors(fitted), visibility=of_rays).parameters
     figures[CEILING] = {
         state: _figures(
             prepared.views, lambda view, p=parameters: surrogate_irradiance(view, p, seen[view.view.name])
@@ -132,10 +134,7 @@ def _of_fitted(views: tuple[CapturedView, ...]) -> tuple[CapturedView, ...]:
 
 
 def _tuned(views: tuple[CapturedView, ...], mode: Visibility) -> ArtistParameters:
-    if mode == "none":
-        return fit_to(fit_views(views, DEFAULT), DEFAULT, held=frozenset({"falloff_transmittance"}))[0]
-    start = fit_visibility(views, DEFAULT)[0] if mode == "maps" else DEFAULT
-    return fit_falloff(views, start)[0]
+    return fit_placement(views, DEFAULT, robust_errors(views), held=held_for(mode)).parameters
 
 
 def ray_visibility(prepared: PreparedScene, view: CapturedView) -> np.ndarray:

@@ -17,7 +17,8 @@ from renderer.views import View
 from tuner.captured_view import capture_views
 from tuner.comparison_picture import captioned, picture_row
 from tuner.evaluate import evaluate
-from tuner.fit_falloff import fit_falloff
+from tuner.fit_placement import fit_placement
+from tuner.fit_views import robust_errors
 from tuner.prepare_scene import SceneOptions, Stopwatch, prepare_scene
 from tuner.reference import reference_views
 
@@ -38,7 +39,7 @@ def main() -> None:
         config = TunedConfig(visibility=visibility)
         prepared = prepare_scene(SCENE, SceneOptions(), config, Stopwatch(), lambda *_: None)
         fitted = tuple(each for each in prepared.views if each.view.split == "fitted")
-        tuned, _ = fit_falloff(fitted, config.parameters)
+        tuned = fit_placement(fitted, config.parameters, robust_errors(fitted)).parameters
         (seen,) = capture_views(prepared.runtime, (view,), references)
         (evaluated,) = evaluate(scene, prepared.runtime, (seen,), config.parameters, tuned).views
         for variant in variants:

@@ -259,3 +259,17 @@ class ArtistParameters:
     def as_dict(self) -> dict[str, float | int]:
         """The values by name, in the table's order."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
+
+
+Placement = tuple[int, float, float, int]
+"""N, γ, η, λ."""
+
+
+def placement(parameters: ArtistParameters) -> Placement:
+    """The parameters that VPLs are placed by: with equal ones, VPLs and their maps are the same."""
+    return (
+        parameters.vpl_count,
+        parameters.density_exponent,
+        parameters.density_importance,
+        parameters.density_relaxation,
+    )

@@ -1,6 +1,7 @@
 """Reading a drawn frame back into numpy, row 0 at the top, for the tuner, tests and picture files."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import moderngl
 import numpy as np
@@ -13,16 +14,44 @@ from renderer.visibility_map_layout import TEXEL_BYTES
 
 @dataclass(frozen=True, eq=False)
 class VisibilityMaps:
-    """The surfaces that each VPL sees: a ray for each texel of its hemisphere, a block at a silhouette."""
+    """The surfaces that each VPL sees: a ray for each texel of its hemisphere, a block at a silhouette.
 
-    distance: Float32[np.ndarray, "vpls size size"]
-    """In units of L; 0 where there is a block."""
-    normal: Float32[np.ndarray, "vpls size size 3"]
-    """Towards the VPL, in its own frame (`hemisphere_frame`)."""
+    Kept as the GPU packs them, and unpacked when first asked for: of most frames nobody asks.
+    """
+
+    texels: UInt32[np.ndarray, "vpls size size 2"]
+    """Zero where there is a block."""
     block: Int32[np.ndarray, "vpls size size"]
     """Which block of finer texels stands for this one, counted in the order of texels; -1 where none does."""
-    block_distance: Float32[np.ndarray, "blocks refinement refinement"]
-    block_normal: Float32[np.ndarray, "blocks refinement refinement 3"]
+    details: UInt32[np.ndarray, "blocks refinement refinement 2"]
+
+    @property
+    def distance(self) -> Float32[np.ndarray, "vpls size size"]:
+        """In units of L; 0 where there is a block."""
+        return self._maps[0]
+
+    @property
+    def normal(self) -> Float32[np.ndarray, "vpls size size 3"]:
+        """Towards the VPL, in its own frame (`hemisphere_frame`)."""
+        return self._maps[1]
+
+    @property
+    def block_distance(self) -> Float32[np.ndarray, "blocks refinement refinement"]:
+        """In units of L."""
+        return self._blocks[0]
+
+    @property
+    def block_normal(self) -> Float32[np.ndarray, "blocks refinement refinement 3"]:
+        """As `normal`."""
+        return self._blocks[1]
+
+    @cached_property
+    def _maps(self) -> tuple[np.ndarray, np.ndarray]:
+        return _met_surfaces(self.texels)
+
+    @cached_property
+    def _blocks(self) -> tuple[np.ndarray, np.ndarray]:
+        return _met_surfaces(self.details)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +85,9 @@ class CapturedFrame:
     """L: flux-weighted RMS distance of the lit RSM texels from their centroid."""
 
 
-def capture_frame(frame: Frame, view: View) -> CapturedFrame:
-    """Read back everything that `frame` holds of `view`, which it has just drawn."""
+def capture_frame(frame: Frame, view: View, *, maps: bool = True) -> CapturedFrame:
+    """Read back everything that `frame` holds of `view`, which it has just drawn; `maps` False leaves out the
+    visibility maps, which weigh the most."""
     context = frame.gbuffer.depth.ctx
     context.memory_barrier(context.BUFFER_UPDATE_BARRIER_BIT)
     depth_buffer = read_picture(frame.gbuffer.depth)
@@ -81,7 +111,7 @@ def capture_frame(frame: Frame, view: View) -> CapturedFrame:
         vpl_footprint=vpls[:, 3],
         vpl_flux=vpls[:, 8:11],
         vpls_are_cells=frame.vpls_are_cells,
-        visibility_maps=_visibility_maps(frame),
+        visibility_maps=_visibility_maps(frame) if maps else None,
         scene_length=float(statistics[2]),
     )
 
@@ -102,7 +132,7 @@ def _visibility_maps(frame: Frame) -> VisibilityMaps | None:
     texels = np.where(refined[..., None], np.uint32(0), texels)
     block = np.full(refined.shape, -1, np.int32)
     block[refined] = np.arange(len(details), dtype=np.int32)
-    return VisibilityMaps(*_met_surfaces(texels), block, *_met_surfaces(details))
+    return VisibilityMaps(texels, block, details)
 
 
 def _met_surfaces(

@@ -137,6 +137,14 @@ class Frame:
         self._context.memory_barrier(self._context.SHADER_IMAGE_ACCESS_BARRIER_BIT)
         self._draw_indirect(view, parameters, table_rotation, None)
 
+    def gather_again(self, view: View, parameters: ArtistParameters) -> None:
+        """Gather once more, with other falloff and visibility parameters, from the VPLs and maps as `draw`
+        has left them. Dynamic lights are left out of a near field."""
+        self._context.memory_barrier(self._context.SHADER_IMAGE_ACCESS_BARRIER_BIT)
+        self.parameters.write(parameters)
+        self.parameters.bind()
+        self._gather_indirect(view, parameters, None)
+
     def _draw_surfaces(
         self, view: View, records: LightRecords, parameters: ArtistParameters, lights: DynamicLights | None
     ) -> LightAccumulation | None:
@@ -170,6 +178,12 @@ class Frame:
         self._place_vpls(table_rotation, parameters.density_relaxation)
         self._cast_visibility_maps()
         self._set_auto_parameters(camera)
+        self._gather_indirect(view, parameters, accumulated)
+
+    def _gather_indirect(
+        self, view: View, parameters: ArtistParameters, accumulated: LightAccumulation | None
+    ) -> None:
+        camera = self.camera(view)
         self._gather(camera)
         self.indirect_irradiance = self.vpl_irradiance
         # Discs withhold nothing that a near field would have to give back.

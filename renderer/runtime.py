@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float32
 
 from renderer.animation import Pose
-from renderer.artist_parameters import ArtistParameters
+from renderer.artist_parameters import ArtistParameters, placement
 from renderer.capture import CapturedFrame, capture_frame, read_picture
 from renderer.dynamic_lights import DynamicLights
 from renderer.frame import Frame, frame_light_records
@@ -247,6 +247,37 @@ class Runtime:
                 frame.draw_indirect_again(view, self._gathered_parameters(), rotation)
             captured.append(self._captured(frame, view))
         return captured
+
+    @_on_own_context
+    def capture_variants(
+        self,
+        view: View,
+        parameters: Sequence[ArtistParameters],
+        table_rotation: tuple[float, float] = (0.0, 0.0),
+    ) -> tuple[CapturedFrame, list[Float32[np.ndarray, "height width 3"]]]:
+        """As `capture`, without visibility maps, and the indirect irradiance [W/m²] with each of
+        `parameters`.
+
+        The parameters must place VPLs alike: these and their maps are drawn once. The first of them are
+        those that the frame is captured with. Takes the place of the runtime's parameters, and of its prior.
+
+        Raises:
+            ValueError: there are no parameters, or they place VPLs differently.
+        """
+        if len({placement(each) for each in parameters}) != 1:
+            raise ValueError(
+                "capture_variants: parameters must be one or more with one placement of the VPLs"
+            )
+        self.parameters = parameters[0]
+        frame = self._draw(view, table_rotation)
+        captured = capture_frame(frame, view, maps=False)
+        images = [captured.indirect_irradiance]
+        for each in parameters[1:]:
+            self.parameters = each
+            frame.gather_again(view, self._gathered_parameters())
+            images.append(np.ascontiguousarray(read_picture(frame.indirect_irradiance)[..., :3]))
+        check_errors(self._context, f"the irradiance of view {view.name}")
+        return captured, images
 
     def _captured(self, frame: Frame, view: View) -> CapturedFrame:
         captured = capture_frame(frame, view)

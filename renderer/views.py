@@ -4,7 +4,7 @@ import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from jaxtyping import Float64
@@ -13,7 +13,10 @@ from renderer.atomic_file import write_text_whole
 from renderer.errors import InputError
 from renderer.scene import Camera, Light, scaled_camera, scaled_light
 
-Split = Literal["fitted", "held_out"]
+Split = Literal["fitted", "validation", "held_out"]
+"""What a view is for: `fitted` views are fitted to, `validation` views choose between the candidates of a
+fit, `held_out` views choose nothing and are only measured."""
+SPLITS: tuple[Split, ...] = get_args(Split)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +121,8 @@ def _view_from_json(entry: Any, where: str) -> View:
     if (size < 1).any() or (size > 16384).any() or (size != np.round(size)).any():
         raise InputError(f"{where}.size: must be two whole numbers from 1 to 16384, got {size.tolist()}")
     split = _member(entry, "split", where)
-    if split not in ("fitted", "held_out"):
-        raise InputError(f"{where}.split: must be 'fitted' or 'held_out', got {split!r}")
+    if split not in SPLITS:
+        raise InputError(f"{where}.split: must be one of {', '.join(SPLITS)}, got {split!r:.60}")
     lights = _member(entry, "lights", where)
     if not isinstance(lights, list):
         raise InputError(f"{where}.lights: must be a list, got {type(lights).__name__}")

@@ -8,7 +8,7 @@ import jax
 
 from tuner.reference.cache import cache_folder
 
-LEAST_SECONDS = 0.1
+LEAST_SECONDS = 0.02
 """Of compilation, below which keeping a function is not worth a file."""
 
 

@@ -4,7 +4,7 @@ The ceiling is the same VPLs with ray-traced visibility towards every pixel, fit
 of its error no choice of the falloff parameters can take away.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -14,15 +14,18 @@ from jaxtyping import Bool, Float32
 from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
 from renderer.scene import Scene
-from tuner.captured_view import CapturedView, runtime_irradiance
-from tuner.fit_falloff import fit_falloff
+from tuner.captured_view import PIXELS_STEP, CapturedView, runtime_irradiance
+from tuner.fit_placement import fit_placement
+from tuner.fit_views import robust_errors
 from tuner.reference import noise_floor, ray_traced_visibility
 from tuner.tabulated_gather import Visibility
-from tuner.view_metrics import ViewMetrics, mean_metrics, view_metrics
+from tuner.view_metrics import ViewMetrics, mean_metrics
 from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_gather import FalloffParameters, gather
 from tuner.wide_vectors import wide_jit
 
+CEILING_TURNS = 2
+"""Reweightings of the ceiling's fit, which begins with the tuned parameters."""
 VARIANTS = ("default", "tuned", "ceiling")
 SPLITS = ("fitted", "held_out")
 
@@ -71,8 +74,23 @@ class Evaluation:
         unlit = [each.view.view.name for each in self.views if not each.view.lit]
         if not unlit:
             return ()
-        names = ", ".join(unlit)
-        return (f"no indirect light reaches {names}: relMSE and energy ratio have no value there",)
+        return (f"no indirect light reaches {', '.join(unlit)}: relMSE and energy ratio have no value there",)
+
+    def most_and_least_gained(self) -> tuple[tuple[str, EvaluatedView], ...]:
+        """The views in which tuned gained most and least over default by trimmed relMSE, each with these
+        words.
+
+        One view where there is but one; the first where light reaches none.
+        """
+        measured = [
+            (each.metrics["tuned"].trimmed_relmse / each.metrics["default"].trimmed_relmse, index)
+            for index, each in enumerate(self.views)
+            if each.metrics["default"].trimmed_relmse > 0.0
+        ]
+        if not measured:
+            return (("no indirect light", self.views[0]),)
+        most, least = self.views[min(measured)[1]], self.views[max(measured)[1]]
+        return (("gained most", most),) + ((("gained least", least),) if least is not most else ())
 
     def _split(self, split: str) -> dict[str, Any]:
         views = [evaluated for evaluated in self.views if evaluated.view.view.split == split]
@@ -93,11 +111,16 @@ def evaluate(
     tuned: ArtistParameters | None,
     *,
     seed: int = 0,
+    known: Sequence[CapturedView] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Evaluation:
-    """Measure every view. `progress` is called with the share done, in [0, 1].
+    """Measure every view.
 
-    `tuned` None takes for each view what it was captured with, as a prior set it.
+    Args:
+        views: captured with the VPLs of `tuned`.
+        tuned: None takes for each view what it was captured with, as a prior set it.
+        known: other captures of the same views, whose images need not be drawn again.
+        progress: called with the share done, in [0, 1].
     """
     visibilities = []
     for index, view in enumerate(views):
@@ -105,17 +128,19 @@ def evaluate(
         if progress is not None:
             progress(0.5 * (index + 1) / len(views))
     fitted = [i for i, view in enumerate(views) if view.view.split == "fitted"]
-    ceiling, _ = fit_falloff(
-        tuple(views[i] for i in fitted),
-        default,
+    ceiling = fit_placement(
+        [views[i] for i in fitted],
+        default if tuned is None else tuned,
+        robust_errors([views[i] for i in fitted], seed=seed),
         seed=seed,
-        visibility=tuple(visibilities[i] for i in fitted),
-    )
+        visibility=[visibilities[i] for i in fitted],
+        turns=CEILING_TURNS,
+    ).parameters
     evaluated = []
     for index, (view, visibility) in enumerate(zip(views, visibilities, strict=True)):
         chosen = view.drawn_with if tuned is None else tuned
         assert chosen is not None, "a view that a prior was captured with knows its parameters"
-        evaluated.append(_evaluate_view(runtime, view, default, chosen, ceiling, visibility))
+        evaluated.append(_evaluate_view(runtime, view, known, default, chosen, ceiling, visibility))
         if progress is not None:
             progress(0.5 + 0.5 * (index + 1) / len(views))
     return Evaluation(tuple(evaluated), ceiling)
@@ -124,23 +149,18 @@ def evaluate(
 def _evaluate_view(
     runtime: Runtime,
     view: CapturedView,
+    known: Sequence[CapturedView],
     default: ArtistParameters,
     tuned: ArtistParameters,
     ceiling: ArtistParameters,
     visibility: Bool[np.ndarray, "receivers vpls"],
 ) -> EvaluatedView:
     pictures = {
-        "default": runtime_irradiance(runtime, default, view),
-        "tuned": runtime_irradiance(runtime, tuned, view),
+        "default": runtime_irradiance(runtime, default, view, known),
+        "tuned": runtime_irradiance(runtime, tuned, view, known),
         "ceiling": surrogate_irradiance(view, ceiling, visibility),
     }
-    reference_radiance = view.reference_radiance()
-    metrics = {
-        name: view_metrics(
-            picture, view.reference.irradiance, view.runtime_radiance(picture), reference_radiance, view.valid
-        )
-        for name, picture in pictures.items()
-    }
+    metrics = {name: view.metrics(picture) for name, picture in pictures.items()}
     return EvaluatedView(view, tuned, pictures, metrics, noise_floor(view.reference))
 
 
@@ -161,9 +181,13 @@ def surrogate_irradiance(
     visibility: Visibility | None = None,
 ) -> Float32[np.ndarray, "height width 3"]:
     """The surrogate's indirect irradiance of a whole view, zero where nothing is seen."""
-    receivers, vpls = gather_inputs(view.captured)
-    picture = np.zeros((*view.captured.valid.shape, 3), np.float32)
-    picture[view.captured.valid] = np.asarray(
-        _gather(receivers, vpls, FalloffParameters.of(parameters), visibility)
-    )
+    valid = view.captured.valid
+    count = int(valid.sum())
+    # Views of one size have differing numbers of receivers; repeating some shares the compiled gather.
+    repeated = np.arange(count + -count % PIXELS_STEP) % max(count, 1)
+    receivers, vpls = gather_inputs(view.captured, repeated)
+    seen = None if visibility is None else np.asarray(visibility, np.float32)[repeated]
+    picture = np.zeros((*valid.shape, 3), np.float32)
+    gathered = _gather(receivers, vpls, FalloffParameters.of(parameters), seen)
+    picture[valid] = np.asarray(gathered)[:count]
     return picture

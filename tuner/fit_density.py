@@ -27,10 +27,11 @@ from jaxtyping import Float
 from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
 from tuner.captured_view import CapturedView
-from tuner.fit_falloff import fit_falloff
+from tuner.fit_placement import fit_placement
 from tuner.fit_status import Descent
-from tuner.fit_visibility import fit_falloff_and_visibility
-from tuner.losses.relative_squared_error import EVEN_SHARE, target_of, weighted_squared_error
+from tuner.fit_views import robust_errors
+from tuner.losses.relative_squared_error import target_of, weighted_squared_error
+from tuner.losses.robust_error import RobustError
 from tuner.search_space import held_for
 
 ROTATIONS = 8
@@ -127,7 +128,7 @@ def fit_density(
     *,
     seed: int = 0,
     rotations: Sequence[Rotation] | None = None,
-    even_share: float = EVEN_SHARE,
+    robust: bool = True,
     progress: Callable[[float], None] | None = None,
 ) -> DensityFit:
     """Density and falloff for `start.vpl_count` VPLs, robust over rotations of the point table.
@@ -138,26 +139,27 @@ def fit_density(
         start: the count, where the falloff's fit begins, and what is not fitted.
         seed: of rotations and pixels.
         rotations: what to fit to; None takes `ROTATIONS` of them.
-        even_share: weight of plain squared error beside relMSE, see `tuner.losses`.
+        robust: whether to minimise the robust error of `tuner.losses.robust_error`; else relMSE.
         progress: called with the share done, in [0, 1].
     """
     chosen = table_rotations(ROTATIONS, seed) if rotations is None else tuple(rotations)
     fits: dict[Density, tuple[ArtistParameters, Descent]] = {}
+    held = held_for(runtime.visibility)
+    errors: tuple[RobustError, ...] | None = None
 
     def best() -> Density:
         return min(fits, key=lambda density: fits[density][1].loss)
 
     def measure(density: Density) -> Descent:
+        nonlocal errors
         if density not in fits:
             parameters = _with(start, density)
             drawn = rotated_views(runtime, views, parameters, chosen)
-            if runtime.visibility == "maps":
-                fits[density] = fit_falloff_and_visibility(
-                    drawn, parameters, seed=seed, even_share=even_share
-                )
-            else:
-                held = held_for(runtime.visibility)
-                fits[density] = fit_falloff(drawn, parameters, seed=seed, held=held, even_share=even_share)
+            if robust and errors is None:
+                # The start's own density comes first: its errors set the scale for all.
+                errors = robust_errors(drawn, seed=seed)
+            fit = fit_placement(drawn, parameters, errors, seed=seed, held=held)
+            fits[density] = fit.parameters, fit.descent
             if progress is not None:
                 progress(min(len(fits) / _TRIALS, 1.0))
         return fits[density][1]
@@ -204,11 +206,11 @@ def density_document(
     }
 
 
-def with_cells(parameters: ArtistParameters) -> ArtistParameters:
+def with_cells(parameters: ArtistParameters, relaxation: int = RELAXATION) -> ArtistParameters:
     """Cells in place of points, each a disc of its own size; parameters that have cells are as they were."""
     if parameters.density_relaxation > 0:
         return parameters
-    return replace(parameters, density_relaxation=RELAXATION, falloff_footprint=CELL_FOOTPRINT)
+    return replace(parameters, density_relaxation=relaxation, falloff_footprint=CELL_FOOTPRINT)
 
 
 def _with(parameters: ArtistParameters, density: Density) -> ArtistParameters:
@@ -226,4 +228,4 @@ def _with(parameters: ArtistParameters, density: Density) -> ArtistParameters:
 def _relmse(view: CapturedView) -> float:
     halves = (half[view.valid] for half in (view.reference.irradiance_a, view.reference.irradiance_b))
     picture = jnp.asarray(view.captured.indirect_irradiance[view.valid])
-    return float(weighted_squared_error(picture, target_of(*halves, even_share=0.0)))
+    return float(weighted_squared_error(picture, target_of(*halves)))

@@ -1,6 +1,7 @@
-"""Fits intensity and falloff to captured views: tabulated gather, relative error and fit put together.
+"""Fits intensity and falloff to views whose weights are given: one least-squares problem of a few hundred
+rows.
 
-The picture is linear in the intensity k, so at every point of the other parameters the best k has a closed
+The image is linear in the intensity k, so at every point of the other parameters the best k has a closed
 form, and the fit moves over the others alone (variable projection, Golub and Pereyra 1973).
 """
 
@@ -11,14 +12,12 @@ from functools import lru_cache, partial
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
-from tuner.captured_view import CapturedView
 from tuner.descent import STEPS, Residuals, descend
 from tuner.fit_status import Descent, FitStatus
-from tuner.fit_views import FitView, fit_view_of
-from tuner.losses.relative_squared_error import EVEN_SHARE
+from tuner.fit_views import FitView
 from tuner.reduced_gather import ReducedGather, reduced_picture
 from tuner.search_space import SearchSpace
 from tuner.vpl_gather import FalloffParameters
@@ -26,59 +25,6 @@ from tuner.vpl_gather import FalloffParameters
 Data = tuple[ReducedGather, ...]
 
 _INTENSITY = next(spec for spec in ARTIST_PARAMETERS if spec.name == "intensity")
-
-
-def fit_falloff(
-    views: tuple[CapturedView, ...],
-    start: ArtistParameters,
-    *,
-    seed: int = 0,
-    steps: int = STEPS,
-    held: frozenset[str] = frozenset(),
-    visibility: tuple[Bool[np.ndarray, "receivers vpls"], ...] | None = None,
-    even_share: float = EVEN_SHARE,
-    progress: Callable[[float], None] | None = None,
-) -> tuple[ArtistParameters, Descent]:
-    """The parameters that bring the views closest to their references, all views counting the same.
-
-    Args:
-        views: what to fit to; at least one.
-        start: where to begin, and what the other parameters stay at.
-        seed: of the choice of pixels.
-        held: names of parameters that stay at the start's.
-        visibility: for each view, of every valid pixel and VPL; None takes what the runtime itself knows
-            of it, from the views' visibility maps where they have them.
-        even_share: weight of plain squared error beside relMSE, see `tuner.losses`.
-        progress: called with the share done, in [0, 1].
-    """
-    return fit_to(
-        fit_views(views, start, seed=seed, visibility=visibility, even_share=even_share),
-        start,
-        held=held,
-        steps=steps,
-        progress=progress,
-    )
-
-
-def fit_views(
-    views: tuple[CapturedView, ...],
-    start: ArtistParameters,
-    *,
-    seed: int = 0,
-    visibility: tuple[Bool[np.ndarray, "receivers vpls"], ...] | None = None,
-    even_share: float = EVEN_SHARE,
-) -> tuple[FitView, ...]:
-    """The views ready to be fitted; arguments as those of `fit_falloff`."""
-    return tuple(
-        fit_view_of(
-            view,
-            start,
-            None if visibility is None else visibility[index],
-            seed=seed + index,
-            even_share=even_share,
-        )
-        for index, view in enumerate(views)
-    )
 
 
 def fit_to(

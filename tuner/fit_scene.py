@@ -8,7 +8,9 @@ from pathlib import Path
 from statistics import fmean
 from typing import Any
 
-from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters, parameter_spec
+import numpy as np
+
+from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters, parameter_spec, placement
 from renderer.atomic_file import write_text_whole
 from renderer.auto_prior import AUTO_PARAMETERS, place_of, value_at
 from renderer.errors import InputError
@@ -18,20 +20,21 @@ from renderer.views import write_views
 from tuner.captured_view import CapturedView, capture_views
 from tuner.comparison_picture import write_comparison
 from tuner.error_budget import error_budget
-from tuner.evaluate import SPLITS, EvaluatedView, Evaluation, evaluate
-from tuner.fit_budget import BudgetOptions, fit_to_budget
-from tuner.fit_density import density_document, fit_density
-from tuner.fit_falloff import fit_views
-from tuner.fit_status import Descent
-from tuner.fit_visibility import fit_visibility
+from tuner.evaluate import Evaluation, evaluate
+from tuner.evidence import doubts, undetermined
+from tuner.fit_budget import BudgetOptions
+from tuner.fit_density import table_rotations
+from tuner.fit_search import Search, search
+from tuner.fit_status import Descent, FitStatus, Outcome
+from tuner.guard import Verdict, verdict
 from tuner.prepare_scene import PreparedScene, Progress, SceneOptions, Stopwatch, prepare_scene
 from tuner.reference.content_key import scene_digest
-from tuner.search_space import SearchSpace, held_for
-from tuner.uncertainty import Interval, fit_with_intervals, intervals
+from tuner.search_space import SearchSpace
+from tuner.validation import candidates, validation_metrics
 from tuner.view_pictures import write_view_pictures
 
-PANEL_HEIGHT = 240
-"""Pixels; the panels of comparison.png are at least this high."""
+VALIDATION_ROTATIONS = 4
+"""Of the point table, that few VPLs are drawn with in each validation view: one placement is mostly luck."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +57,7 @@ class FitResult:
     """What `fit_scene` made."""
 
     config: TunedConfig
+    status: Outcome
     descent: Descent
     evaluation: Evaluation
     notes: tuple[str, ...]
@@ -99,55 +103,52 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
     watch = Stopwatch()
     if output.exists() and not output.is_dir():
         raise InputError(f"{output}: the output must be a folder, and is a file")
-    prepared = prepare_scene(scene_path, options, options.start, watch, progress)
-    default = default_like(options.start.parameters)
-    with watch.stage("fit"):
-        tuned, descent, known, views, found = _fitted(prepared, options, output, progress)
+    prepared = prepare_scene(scene_path, options, options.start, watch, progress, validated=True)
+    fitted = [view for view in prepared.views if view.view.split == "fitted"]
+    drawn = [view.drawn_with for view in fitted if view.drawn_with is not None]
+    start = replace(options.start, parameters=fit_start(options.start, drawn), auto=None)
+    if any(view.lit for view in fitted):
+        found = _judged(prepared, start, options, output, watch, progress)
+    else:
+        found = _unlit(start)
     with watch.stage("evaluate"):
-        evaluation = evaluate(
-            prepared.scene,
-            prepared.runtime,
-            views,
-            replace(default, vpl_count=tuned.vpl_count),
-            tuned,
-            seed=options.seed,
-            progress=lambda share: progress("evaluate", share),
-        )
+        evaluation = _evaluated(prepared, found, options, progress)
     budget = {}
     if options.split_error:
         with watch.stage("split error"):
             budget["error_budget"] = error_budget(
                 prepared, evaluation, options, lambda share: progress("split error", share)
             )
-    config = TunedConfig(tuned, _provenance(prepared, options, descent), options.start.visibility)
-    write_views(output / "views.json", str(scene_path), tuple(view.view for view in prepared.views))
-    write_comparison(
-        output / "comparison.png", prepared.runtime, _first_of_each_split(evaluation), PANEL_HEIGHT
-    )
+    config = _config(prepared, found, options)
+    views = (*(view.view for view in prepared.views), *(view for view, _ in prepared.validation))
+    write_views(output / "views.json", str(scene_path), views)
+    write_comparison(output / "comparison.png", prepared.runtime, evaluation.most_and_least_gained())
     write_view_pictures(output / "pictures.npz", evaluation.views)
     write_config(output / "tuned.json", config)
-    notes = (*prepared.notes, *evaluation.notes())
+    notes = (*prepared.notes, *evaluation.notes(), *found.notes)
+    descent = found.descent
     document = {
         "scene": str(scene_path),
-        "parameters": tuned.as_dict(),
+        "parameters": config.parameters.as_dict(),
         "visibility": config.visibility,
         "views": str(output / "views.json"),
         "metrics": evaluation.summary(),
         "seconds": watch.report(),
-        "status": descent.status.outcome,
-        "sentence": descent.status.value,
+        "status": found.status,
+        "sentence": found.sentence,
         "loss": {
             "start": descent.start_loss,
             "end": descent.loss,
             "steps": len(descent.losses) - 1,
             "curve": descent.losses.tolist(),
         },
-        "uncertainty": {name: asdict(interval) for name, interval in known.items()},
+        "uncertainty": {name: asdict(interval) for name, interval in found.known.items()},
+        **({} if found.verdict is None else {"validation": found.verdict.document()}),
         **budget,
         "ceiling_parameters": evaluation.ceiling_parameters.as_dict(),
         "per_view": evaluation.per_view(),
         "notes": list(notes),
-        **found,
+        **found.document,
         "provenance": {
             **config.provenance,
             "python": platform.python_version(),
@@ -157,58 +158,154 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
         },
     }
     write_text_whole(output / "metrics.json", strict_json(document) + "\n")
-    return FitResult(config, descent, evaluation, notes, document)
+    return FitResult(config, found.status, descent, evaluation, notes, document)
 
 
-def _fitted(
-    prepared: PreparedScene, options: FitOptions, output: Path, progress: Progress
-) -> tuple[ArtistParameters, Descent, dict[str, Interval], tuple[CapturedView, ...], dict[str, Any]]:
-    """Parameters, how the fit ended, their intervals, views captured for them, what metrics.json gains."""
-    views, seed = _of_fitted(prepared.views), options.seed
-    start = fit_start(options.start, [view.drawn_with for view in views if view.drawn_with is not None])
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """How a fit ended, and what it rests on."""
 
-    def report(share: float) -> None:
-        progress("fit", share)
+    status: Outcome
+    sentence: str
+    parameters: ArtistParameters
+    start: ArtistParameters
+    """The start at the cost of what was found: what `default` has to be compared at."""
+    descent: Descent
+    known: dict[str, Any] = field(default_factory=dict)
+    verdict: Verdict | None = None
+    captured: tuple[CapturedView, ...] = ()
+    """Fitted views captured with the placement that the search ended at."""
+    notes: tuple[str, ...] = ()
+    document: dict[str, Any] = field(default_factory=dict)
 
-    lit = any(view.lit for view in views)
-    if options.budget is not None and lit:
-        tuned, descent, found = fit_to_budget(
+
+def _unlit(start: TunedConfig) -> _Found:
+    point = SearchSpace().point(start.parameters)
+    descent = Descent(point, float("nan"), float("nan"), np.array([np.nan]), FitStatus.NOTHING_LIT)
+    return _Found("unlit", descent.status.value, start.parameters, start.parameters, descent)
+
+
+def _judged(
+    prepared: PreparedScene,
+    start: TunedConfig,
+    options: FitOptions,
+    output: Path,
+    watch: Stopwatch,
+    progress: Progress,
+) -> _Found:
+    """Search on the fitted views, and choose on the validation views."""
+    with watch.stage("fit"):
+        found = search(
             prepared,
-            replace(options.start, parameters=start, auto=None),
-            options.budget,
+            start,
             output,
-            seed=seed,
-            progress=report,
+            density=options.density,
+            budget=options.budget,
+            seed=options.seed,
+            progress=lambda share: progress("fit", share),
         )
-    elif options.density and lit:
-        density = fit_density(prepared.runtime, views, start, seed=seed, progress=report)
-        tuned, descent = density.parameters, density.descent
-        default = default_like(options.start.parameters)
-        measured = tuple(view for view in views if view.lit)
-        document = density_document(prepared.runtime, measured, default, density, seed)
-        found = {"density": document}
+    baseline = replace(start.parameters, vpl_count=found.tuned.vpl_count)
+    with watch.stage("validate"):
+        chosen, doubt = _validated(prepared, baseline, found, options, progress)
+    notes = undetermined(found.known, found.tuned, baseline)
+    if found.descent.status is FitStatus.NOT_FINITE:
+        doubt = (*doubt, found.descent.status.value)
+    status: Outcome
+    if doubt:
+        status, sentence, parameters = "doubtful", f"{'; '.join(doubt)}; the start is kept", baseline
+    elif chosen is not None and chosen.chosen is not None:
+        status, sentence, parameters = "improved", chosen.sentence, chosen.chosen.parameters
     else:
-        if options.start.visibility == "maps":
-            start, _ = fit_visibility(views, start, seed=seed)
-        ready = fit_views(views, start, seed=seed)
-        tuned, descent, known = fit_with_intervals(
-            ready, start, held=held_for(options.start.visibility), progress=report
-        )
-        return tuned, descent, known, prepared.views, {}
-    # The VPLs are others now, in number and in place.
-    prepared.runtime.parameters = tuned
-    references = tuple(view.reference for view in prepared.views)
-    captured = capture_views(prepared.runtime, tuple(view.view for view in prepared.views), references)
-    if descent.status.nothing_fitted:
-        return tuned, descent, {}, captured, found
-    # Of one rotation: several of one view err together, and would pass for so many witnesses.
-    ready = fit_views(_of_fitted(captured), tuned, seed=seed)
-    names = frozenset(SearchSpace().names) - held_for(options.start.visibility)
-    return tuned, descent, intervals(ready, tuned, names), captured, found
+        assert chosen is not None, "nothing is in doubt, so the candidates were judged"
+        status, sentence, parameters = "kept", chosen.sentence, baseline
+    return _Found(
+        status,
+        sentence,
+        parameters,
+        baseline,
+        found.descent,
+        found.known,
+        chosen,
+        found.views,
+        notes,
+        found.document,
+    )
 
 
-def _of_fitted(views: tuple[CapturedView, ...]) -> tuple[CapturedView, ...]:
-    return tuple(view for view in views if view.view.split == "fitted")
+def _validated(
+    prepared: PreparedScene,
+    start: ArtistParameters,
+    found: Search,
+    options: FitOptions,
+    progress: Progress,
+) -> tuple[Verdict | None, tuple[str, ...]]:
+    """What the validation views choose, and what speaks against judging by them."""
+    auto = _auto_candidate(prepared, start, options)
+    tried = candidates(start, found.base, found.tuned, auto)
+    count = VALIDATION_ROTATIONS if options.density or options.budget is not None else 1
+    metrics, captured = validation_metrics(
+        prepared.runtime,
+        prepared.validation,
+        {"start": start, **tried},
+        table_rotations(count, options.seed),
+        lambda share: progress("validate", share),
+    )
+    fitted = [view for view in prepared.views if view.view.split == "fitted"]
+    doubt = doubts(fitted, captured)
+    if len(metrics["start"]) < 2:
+        return None, doubt
+    judged = {name: (parameters, metrics[name]) for name, parameters in tried.items()}
+    return verdict(metrics["start"], judged), doubt
+
+
+def _auto_candidate(
+    prepared: PreparedScene, start: ArtistParameters, options: FitOptions
+) -> ArtistParameters | None:
+    """What the shipped prior sets at the start's placement, the mean over the fitted views in the unit cube.
+
+    None where it was not trained for it: with clustered discs, or without maps.
+    """
+    if start.density_relaxation > 0 or options.start.visibility != "maps" or options.start.auto is not None:
+        return None
+    prior = read_config("auto").auto
+    statistics = [
+        view.statistics
+        for view in prepared.views
+        if view.view.split == "fitted" and view.statistics is not None and view.drawn_with == start
+    ]
+    if prior is None or not statistics:
+        return None
+    return _mean_parameters(start, [prior.parameters(each.astype(np.float64), start) for each in statistics])
+
+
+def _evaluated(prepared: PreparedScene, found: _Found, options: FitOptions, progress: Progress) -> Evaluation:
+    """Default, tuned and ceiling in the fitted and the held-out views."""
+    tuned = found.parameters
+    known = (*prepared.views, *found.captured)
+    views = []
+    for view in prepared.views:
+        same = [
+            each
+            for each in known
+            if each.view is view.view
+            and each.drawn_with is not None
+            and placement(each.drawn_with) == placement(tuned)
+        ]
+        if not same:
+            prepared.runtime.parameters = tuned
+            same = list(capture_views(prepared.runtime, (view.view,), (view.reference,)))
+        views.append(same[0])
+    kept_prior = found.parameters == found.start and options.start.auto is not None
+    return evaluate(
+        prepared.scene,
+        prepared.runtime,
+        prepared.views if kept_prior else tuple(views),
+        replace(default_like(options.start.parameters), vpl_count=tuned.vpl_count),
+        None if kept_prior else tuned,
+        seed=options.seed,
+        known=known,
+        progress=lambda share: progress("evaluate", share),
+    )
 
 
 def fit_start(config: TunedConfig, drawn: Sequence[ArtistParameters]) -> ArtistParameters:
@@ -216,13 +313,16 @@ def fit_start(config: TunedConfig, drawn: Sequence[ArtistParameters]) -> ArtistP
     if config.visibility == "none":
         # What the runtime does not look at shall not look as if it did.
         return replace(config.parameters, falloff_transmittance=0.0)
-    if config.auto is None:
-        return config.parameters
+    return config.parameters if config.auto is None else _mean_parameters(config.parameters, drawn)
+
+
+def _mean_parameters(rest: ArtistParameters, drawn: Sequence[ArtistParameters]) -> ArtistParameters:
+    """The mean in the unit cube of what a prior sets; all else from `rest`."""
     values = {}
     for name in AUTO_PARAMETERS:
         spec = parameter_spec(name)
         values[name] = value_at(spec, fmean(place_of(spec, getattr(each, name)) for each in drawn))
-    return replace(config.parameters, **values)
+    return replace(rest, **values)
 
 
 def default_like(start: ArtistParameters) -> ArtistParameters:
@@ -231,10 +331,8 @@ def default_like(start: ArtistParameters) -> ArtistParameters:
     return ArtistParameters(**{**ArtistParameters().as_dict(), **kept})
 
 
-def _provenance(
-    prepared: PreparedScene, options: FitOptions, descent: Descent
-) -> dict[str, str | int | float]:
-    return {
+def _config(prepared: PreparedScene, found: _Found, options: FitOptions) -> TunedConfig:
+    provenance: dict[str, str | int | float] = {
         "scene": prepared.scene.name,
         "scene_sha256": scene_digest(prepared.scene),
         "vpltune": importlib.metadata.version("vpltune"),
@@ -243,10 +341,10 @@ def _provenance(
         "views": options.views,
         "seed": options.seed,
         "bounces": options.bounces,
-        "fit": descent.status.value,
+        "status": found.status,
+        "fit": found.sentence,
     }
-
-
-def _first_of_each_split(evaluation: Evaluation) -> tuple[EvaluatedView, ...]:
-    firsts = {view.view.view.split: view for view in reversed(evaluation.views)}
-    return tuple(firsts[split] for split in SPLITS if split in firsts)
+    if found.parameters == found.start and options.start.auto is not None:
+        # The start was kept, and the start has a prior.
+        return replace(options.start, provenance=provenance)
+    return TunedConfig(found.parameters, provenance, options.start.visibility)

@@ -1,4 +1,4 @@
-"""What a descent ends with. One that fails is a status with a sentence, never an exception."""
+"""How a descent and a fit end. One that fails is a status with a sentence, never an exception."""
 
 import enum
 from dataclasses import dataclass
@@ -7,12 +7,17 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-Outcome = Literal["ok", "unlit", "failed"]
-"""`unlit`: no indirect light reaches the views, which is no failure: there is nothing to fit."""
+Outcome = Literal["improved", "kept", "unlit", "doubtful"]
+"""How a fit ended, as metrics.json, configs, records and reports have it.
+
+`improved`: better than the start on validation views in some measure, and worse in none. `kept`: nothing
+was, and the start is kept. `unlit`: no indirect light reaches the fitted views, so there is nothing to fit.
+`doubtful`: the views or their references do not serve to judge by; the start is kept.
+"""
 
 
 class FitStatus(enum.Enum):
-    """How it ended; the value is the sentence shown to the user."""
+    """How a descent ended; the value is the sentence shown to the user."""
 
     CONVERGED = "the loss has settled"
     STEP_LIMIT = "the steps ran out while the loss was still falling"
@@ -21,15 +26,9 @@ class FitStatus(enum.Enum):
     NOT_FINITE = "the loss at the start is not a finite number; the start is kept"
 
     @property
-    def outcome(self) -> Outcome:
-        """In a word, as metrics.json and records have it."""
-        words: dict[FitStatus, Outcome] = {FitStatus.NOTHING_LIT: "unlit", FitStatus.NOT_FINITE: "failed"}
-        return words.get(self, "ok")
-
-    @property
     def nothing_fitted(self) -> bool:
         """Whether there was nothing that could be fitted."""
-        return self.outcome != "ok"
+        return self in (FitStatus.NOTHING_LIT, FitStatus.NOT_FINITE)
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,8 +35,9 @@ from tuner.fit_density import (
     table_rotations,
     with_cells,
 )
-from tuner.fit_falloff import fit_falloff
+from tuner.fit_placement import fit_placement
 from tuner.fit_status import Descent
+from tuner.fit_views import robust_errors
 from tuner.prepare_scene import PreparedScene
 from tuner.search_space import held_for
 
@@ -279,7 +280,9 @@ class FrameBudget:
     def _falloff_at(self, parameters: ArtistParameters) -> ArtistParameters:
         rotations = table_rotations(HELD_OUT_ROTATIONS, self._seed)
         captured = rotated_views(self._prepared.runtime, self._views, parameters, rotations)
-        return fit_falloff(captured, parameters, seed=self._seed, held=held_for(self._start.visibility))[0]
+        errors = robust_errors(captured, seed=self._seed)
+        held = held_for(self._start.visibility)
+        return fit_placement(captured, parameters, errors, seed=self._seed, held=held).parameters
 
     def runtime(self, choice: FrameChoice) -> Runtime:
         """What draws so; the same one each time."""

@@ -16,7 +16,8 @@ from jaxtyping import Array, Float, Float32
 from renderer.artist_parameters import ArtistParameters, parameter_spec
 from renderer.auto_prior import AUTO_PARAMETERS, place_of, value_at
 from tuner.captured_view import CapturedView
-from tuner.losses.relative_squared_error import EVEN_SHARE, Target, target_of
+from tuner.losses.relative_squared_error import Target, target_of
+from tuner.losses.robust_error import robust_error
 from tuner.virtual_point_lights import Receivers, VirtualPointLights, gather_inputs
 from tuner.vpl_gather import FalloffParameters, gather
 from tuner.vpl_visibility import VisibilityParameters, map_texels, seen_share, surface_overlap
@@ -53,18 +54,23 @@ class LossTable:
 
 
 def loss_table(
-    view: CapturedView, parameters: ArtistParameters, seed: int, even_share: float = EVEN_SHARE
+    view: CapturedView, parameters: ArtistParameters, seed: int, *, robust: bool = True
 ) -> LossTable:
     """The table of one view, from the buffers and the visibility maps that it was captured with.
 
-    `even_share` as `target_of` has it: 0 tabulates relMSE alone. A view in which no light arrives has a table
-    of zeros.
+    With `robust`, pixels weigh as in the first step of a robust fit that begins with the captured image;
+    else as in relMSE. A view in which no light arrives has a table of zeros.
     """
     pixels = view.fitted_pixels(RECEIVERS, seed)
     receivers, vpls = gather_inputs(view.captured, pixels)
     flat = np.flatnonzero(view.captured.valid.ravel())[pixels]
-    halves = (view.reference.irradiance_a, view.reference.irradiance_b)
-    target = target_of(*(half.reshape(-1, 3)[flat] for half in halves), even_share)
+    reference, drawn = view.reference, view.captured.indirect_irradiance.reshape(-1, 3)[flat]
+    halves = [half.reshape(-1, 3)[flat] for half in (reference.irradiance_a, reference.irradiance_b)]
+    weight = None
+    if robust:
+        direct = reference.direct_irradiance.reshape(-1, 3)[flat]
+        weight = robust_error((halves[0] + halves[1]) / 2.0, direct, drawn).weights(drawn)
+    target = target_of(*halves, weight)
     maps = view.captured.visibility_maps
     overlap = None if maps is None else surface_overlap(receivers, vpls, map_texels(maps))
     square, product = _sums(receivers, vpls, overlap, jnp.float32(parameters.falloff_transmittance), target)

@@ -12,17 +12,21 @@ from renderer.scene import Camera, Light, Scene
 from renderer.scene_file import read_scene
 from renderer.tuned_config import TunedConfig
 from renderer.view_placement import resolve_camera_and_lights, views_for_scene
-from renderer.views import View
+from renderer.views import SPLITS, View
 from tuner.captured_view import CapturedView, capture_views
 from tuner.compiled_functions import keep_compiled_functions
 from tuner.reference import ReferenceView, reference_views
 
 Progress = Callable[[str, float], None]
 
-VIEW_SIZE = (128, 96)
-"""Of the views that are fitted and measured: 12,288 receivers each."""
-NOISE_TARGET = 1e-3
-"""Noise floor, in relMSE, at which a reference is good enough: well under any model's own error."""
+VIEW_SIZE = (64, 48)
+"""Of the views that are fitted and measured. More and smaller views tell more than few large ones:
+neighbouring pixels err together, and what a view costs is mostly its VPLs' visibility maps, whatever its
+size."""
+LEAST_VALIDATION = 3
+"""Validation views at least: the spread between two says next to nothing."""
+NOISE_TARGET = 5e-4
+"""Noise floor, in relMSE, at which a reference is good enough: 2 % of a pixel's irradiance."""
 MAX_SAMPLES = 4096
 """Samples per pixel in each half, where the noise target is not reached before."""
 
@@ -32,12 +36,14 @@ class SceneOptions:
     """What a scene is prepared with.
 
     camera, light: in place of what the file, its sidecar or the placement would give.
-    views: how many views are fitted; half as many, but at least one, are held out.
+    views: how many views are fitted; as many, but at least LEAST_VALIDATION, validate a fit.
+    held_out: how many views are held out; None takes half as many as are fitted, but at least one.
     fixed_views: these and no others; camera, light, views, seed and size then do not place any.
     split_error: whether to split the tuned error by cause, which draws some more frames.
     """
 
-    views: int = 2
+    views: int = 4
+    held_out: int | None = None
     seed: int = 0
     bounces: Literal["1", "all"] = "1"
     camera: Camera | None = None
@@ -74,14 +80,26 @@ class PreparedScene:
     scene: Scene
     runtime: Runtime
     views: tuple[CapturedView, ...]
+    """The fitted and the held-out views, as drawn with the config that the scene was prepared with."""
+    validation: tuple[tuple[View, ReferenceView], ...]
+    """The views that choose between candidates, with their references; none where nothing is to be chosen."""
     notes: tuple[str, ...]
     """What was ignored in the file, and which camera and light were chosen."""
 
 
 def prepare_scene(
-    scene_path: Path, options: SceneOptions, config: TunedConfig, watch: Stopwatch, progress: Progress
+    scene_path: Path,
+    options: SceneOptions,
+    config: TunedConfig,
+    watch: Stopwatch,
+    progress: Progress,
+    *,
+    validated: bool = False,
 ) -> PreparedScene:
     """Read, place views, render references, and capture the runtime's buffers with `config`.
+
+    Args:
+        validated: whether there are to be validation views, which cost a reference each.
 
     Raises:
         InputError: the scene or its sidecar cannot be used.
@@ -91,7 +109,7 @@ def prepare_scene(
     with watch.stage("load"):
         progress("load", 0.0)
         scene = read_scene(scene_path)
-        views, notes = _views(scene, scene_path, options)
+        views, notes = _views(scene, scene_path, options, validated)
         # Before the long work: a machine without OpenGL says so at once.
         runtime = Runtime(scene, config)
     with watch.stage("reference"):
@@ -100,8 +118,14 @@ def prepare_scene(
         )
     with watch.stage("capture"):
         progress("capture", 0.0)
-        captured = capture_views(runtime, views, references)
-    return PreparedScene(scene, runtime, captured, (*scene.warnings, *notes))
+        pairs = list(zip(views, references, strict=True))
+        drawn = [(view, reference) for view, reference in pairs if view.split != "validation"]
+        captured = []
+        for index, (view, reference) in enumerate(drawn):
+            captured += capture_views(runtime, (view,), (reference,), statistics=validated)
+            progress("capture", (index + 1) / len(drawn))
+    validation = tuple(pair for pair in pairs if pair[0].split == "validation")
+    return PreparedScene(scene, runtime, tuple(captured), validation, (*scene.warnings, *notes))
 
 
 def references_of(
@@ -123,9 +147,12 @@ def references_of(
     )
 
 
-def _views(scene: Scene, scene_path: Path, options: SceneOptions) -> tuple[tuple[View, ...], tuple[str, ...]]:
+def _views(
+    scene: Scene, scene_path: Path, options: SceneOptions, validated: bool
+) -> tuple[tuple[View, ...], tuple[str, ...]]:
     if options.fixed_views is not None:
-        return options.fixed_views, ()
+        wanted = SPLITS if validated else ("fitted", "held_out")
+        return tuple(view for view in options.fixed_views if view.split in wanted), ()
     camera, lights, notes = resolve_camera_and_lights(
         scene, scene_path, options.camera, None if options.light is None else (options.light,)
     )
@@ -134,7 +161,8 @@ def _views(scene: Scene, scene_path: Path, options: SceneOptions) -> tuple[tuple
         camera,
         lights,
         fitted=options.views,
-        held_out=max(1, options.views // 2),
+        validation=max(options.views, LEAST_VALIDATION) if validated else 0,
+        held_out=max(1, options.views // 2) if options.held_out is None else options.held_out,
         size=options.size,
         seed=options.seed,
     )

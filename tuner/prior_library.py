@@ -46,7 +46,7 @@ ROTATIONS = {16: _ROTATIONS, 64: _ROTATIONS[:3], 256: _ROTATIONS[:2]}
 """VPL counts, and the rotations of the point table that each is captured with: few VPLs are noisy, and one
 placement's noise is not to be learnt."""
 
-CAPTURE_VERSION = 2
+CAPTURE_VERSION = 3
 """Raise whenever the same scene gives other statistics or another loss: old entries are then passed over.
 What the runtime's options and the maps' layout say is in the key by itself."""
 
@@ -125,7 +125,7 @@ def _captured(
                 captured = CapturedView(view, reference, runtime.capture(view, rotation))
                 statistics.append(runtime.scene_statistics(view))
                 tables.append(loss_table(captured, parameters, seed=0))
-                relmse_tables.append(loss_table(captured, parameters, seed=0, even_share=0.0))
+                relmse_tables.append(loss_table(captured, parameters, seed=0, robust=False))
                 counts.append(vpl_count)
                 fitted.append(view.split == "fitted")
     stacked = (

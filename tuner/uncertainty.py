@@ -27,7 +27,7 @@ from scipy.special import stdtrit
 from renderer.artist_parameters import ArtistParameters
 from tuner.descent import profile
 from tuner.fit_falloff import all_residuals, fit_to
-from tuner.fit_status import Descent
+from tuner.fit_status import Descent, FitStatus
 from tuner.fit_views import TILES, FitView
 from tuner.search_space import SearchSpace
 from tuner.tabulated_gather import gather_tabulated
@@ -38,6 +38,8 @@ OPEN_SHARE = 1.0 / 3.0
 """Of a parameter's range, on its own scale: an interval that is wider says nothing."""
 PRIOR_COST = 0.01
 """Of the sum of squares, which a parameter may cost that goes back to the prior."""
+AT_BOUND = 1e-3
+"""Of the cube's side: nearer to its wall, a parameter is at its bound."""
 REACH = np.geomspace(1e-3, 1.0, 16)
 """Of the cube's side: how far from the optimum a profile is asked, on either side."""
 TRADING = 0.8
@@ -56,6 +58,8 @@ class Interval:
     """False where the views do not tell, and `value` is the prior's."""
     trades_with: tuple[str, ...]
     """Parameters that could move along with it at little cost."""
+    at_bound: float | None = None
+    """The bound of its range that the fit ran to, where `value` is the prior's for that reason."""
 
 
 def fit_with_intervals(
@@ -67,8 +71,10 @@ def fit_with_intervals(
 ) -> tuple[ArtistParameters, Descent, dict[str, Interval]]:
     """Fit from `prior`, and go back to it in what the views leave open, one by one, refitting the rest.
 
-    A parameter is left open where its interval is wide and going back costs next to nothing. Those in `held`
-    stay at the prior, and have no interval.
+    A parameter is left open where its interval is wide and going back costs next to nothing, or where the fit
+    runs to a bound of its range that the prior is not at: what lies beyond the range cannot be meant. Where
+    that is the intensity, which no other parameter can stand in for, all of them go back to the prior.
+    Parameters in `held` stay at the prior, and have no interval.
     """
     names = frozenset(SearchSpace().names) - held
     tuned, descent = fit_to(views, prior, held=held, progress=progress)
@@ -79,13 +85,16 @@ def fit_with_intervals(
     known = intervals(views, tuned, names)
     trades = {name: interval.trades_with for name, interval in known.items()}
     for name in sorted(known, key=lambda name: -_width(name, known[name])):
-        interval = known[name]
-        if name == "intensity" or _width(name, interval) <= OPEN_SHARE:
+        bound = _bound(name, tuned, prior)
+        if bound is None and (name == "intensity" or _width(name, known[name]) <= OPEN_SHARE):
             continue
+        if bound is not None and name == "intensity":
+            every = {each: _open(known[each], prior, each, _bound(each, tuned, prior)) for each in known}
+            return prior, replace(descent, status=FitStatus.NO_IMPROVEMENT), every
         without, at_prior = fit_to(views, prior, held=held | {name, *found})
-        if at_prior.loss - descent.loss > PRIOR_COST * (descent.loss - offset):
+        if bound is None and at_prior.loss - descent.loss > PRIOR_COST * (descent.loss - offset):
             continue
-        found[name] = replace(interval, value=float(getattr(prior, name)), determined=False)
+        found[name] = _open(known[name], prior, name, bound)
         tuned, descent = without, at_prior
         known = intervals(views, tuned, names - frozenset(found)) | found
     # With whom a parameter trades is asked of all of them together, before any was held.
@@ -164,6 +173,23 @@ def _profile_ends(
                 else (0.0, 1.0)[side]
             )
     return ends[0], ends[1]
+
+
+def _open(interval: Interval, prior: ArtistParameters, name: str, bound: float | None) -> Interval:
+    value = float(getattr(prior, name))
+    return replace(interval, value=value, determined=False, at_bound=bound)
+
+
+def _bound(name: str, tuned: ArtistParameters, prior: ArtistParameters) -> float | None:
+    """The bound that a fit ran to; None where it is inside the range, or the prior is at that bound
+    itself."""
+    (spec,) = (spec for spec in SearchSpace().specs if spec.name == name)
+    axis = SearchSpace((spec,))
+    place, before = float(axis.point(tuned)[0]), float(axis.point(prior)[0])
+    for wall, bound in ((0.0, spec.low), (1.0, spec.high)):
+        if abs(place - wall) <= AT_BOUND < abs(before - wall):
+            return float(bound)
+    return None
 
 
 def _width(name: str, interval: Interval) -> float:

@@ -1,12 +1,12 @@
-"""How far a picture is from its reference: relMSE and energy of irradiance, HDR-FLIP of radiance.
+"""How far an image is from its reference: errors and energy of irradiance, HDR-FLIP of the light.
 
-relMSE and energy ratio are relative to the reference's mean: against a black one they are NaN, null in JSON.
+All but FLIP are relative to the reference: against a black one they are NaN, null in JSON.
 """
 
 import math
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from statistics import fmean
 
 # FLIP's threads spin while they wait for each other: on a busy machine two of them took ten times as long
@@ -15,30 +15,69 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import flip_evaluator
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Float64
 
 from tuner.losses.relative_squared_error import DARK_SHARE
+
+WORST_SHARE = 0.001
+"""Share of a view's pixels that the trimmed relMSE leaves out: the worst ones, rounded up to whole pixels."""
 
 
 @dataclass(frozen=True)
 class ViewMetrics:
-    """Of one view, or the mean over several."""
+    """The figures of one view, or the mean over several."""
 
     relmse: float
-    """mean((y − r)²/(r² + 0.01·mean(r)²)) over valid pixels and channels; holds the reference's noise."""
+    """mean((y − r)²/(r² + 0.01·mean(r)²)) over valid pixels and channels; includes the reference's noise."""
+    trimmed_relmse: float
+    """relMSE without the worst `WORST_SHARE` of the pixels."""
+    worst_share: float
+    """Share of the relMSE that these worst pixels hold, in [0, 1]."""
+    median_error: float
+    """The relative error of the typical pixel: median of Σ_c|y − r|/Σ_c r over valid, lit pixels."""
     energy_ratio: float
     """mean(y)/mean(r) over valid pixels and channels."""
     flip: float
-    """Mean HDR-FLIP (Andersson et al. 2021) of direct plus indirect radiance, in [0, 1]."""
+    """Mean HDR-FLIP (Andersson et al. 2021) of direct plus indirect radiance, in [0, 1]. Both images have the
+    runtime's albedo, so that light is compared and texture filtering is not."""
 
 
 def relmse(picture: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:
     """Relative mean squared error; NaN against a black reference."""
+    errors = squared_errors(picture, reference)
+    return float(errors.mean()) if errors.size else math.nan
+
+
+def trimmed_relmse(
+    picture: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]
+) -> tuple[float, float]:
+    """relMSE without the worst `WORST_SHARE` of the pixels, and the share of it that those hold.
+
+    Both are NaN against a black reference or where no pixel is left, the share 0 where there is no error.
+    """
+    errors = np.sort(squared_errors(picture, reference))
+    kept = errors[: len(errors) - math.ceil(WORST_SHARE * len(errors))]
+    if not kept.size:
+        return math.nan, math.nan
+    total = float(errors.sum())
+    return float(kept.mean()), 1.0 - float(kept.sum()) / total if total > 0.0 else 0.0
+
+
+def squared_errors(
+    picture: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]
+) -> Float64[np.ndarray, " pixels"]:
+    """What each pixel adds to the relMSE, times their number; none against a black reference."""
     y, r = picture.astype(np.float64), reference.astype(np.float64)
     denominator = r**2 + DARK_SHARE * r.mean() ** 2 if r.size else r
-    if not denominator.any():
-        return math.nan
-    return float(np.mean((y - r) ** 2 / denominator))
+    return ((y - r) ** 2 / denominator).mean(axis=1) if denominator.any() else np.zeros(0)
+
+
+def median_error(picture: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:
+    """The median relative error over the pixels that light reaches; NaN where it reaches none."""
+    y, r = picture.astype(np.float64), reference.astype(np.float64)
+    level = r.sum(axis=1)
+    lit = level > 0.0
+    return float(np.median(np.abs(y - r).sum(axis=1)[lit] / level[lit])) if lit.any() else math.nan
 
 
 def energy_ratio(picture: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:
@@ -78,11 +117,21 @@ def view_metrics(
     reference_radiance: Float[np.ndarray, "height width 3"],
     valid: Bool[np.ndarray, "height width"],
 ) -> ViewMetrics:
-    """All three figures of one view. Irradiance is that of one bounce, in W/m²; radiance is the whole
-    picture's, in W/(m² sr)."""
+    """All figures of one view.
+
+    Args:
+        irradiance, reference_irradiance: indirect [W/m²].
+        radiance, reference_radiance: of the whole image with one albedo [W/(m² sr)].
+        valid: the pixels that count.
+    """
+    shown, real = irradiance[valid], reference_irradiance[valid]
+    trimmed, worst_share = trimmed_relmse(shown, real)
     return ViewMetrics(
-        relmse=relmse(irradiance[valid], reference_irradiance[valid]),
-        energy_ratio=energy_ratio(irradiance[valid], reference_irradiance[valid]),
+        relmse=relmse(shown, real),
+        trimmed_relmse=trimmed,
+        worst_share=worst_share,
+        median_error=median_error(shown, real),
+        energy_ratio=energy_ratio(shown, real),
         flip=hdr_flip(radiance, reference_radiance),
     )
 
@@ -90,9 +139,7 @@ def view_metrics(
 def mean_metrics(metrics: list[ViewMetrics]) -> ViewMetrics:
     """The mean of each figure over the views that have it; NaN where none does."""
     return ViewMetrics(
-        relmse=_mean(m.relmse for m in metrics),
-        energy_ratio=_mean(m.energy_ratio for m in metrics),
-        flip=_mean(m.flip for m in metrics),
+        **{each.name: _mean(getattr(m, each.name) for m in metrics) for each in fields(ViewMetrics)}
     )
 
 

@@ -71,6 +71,12 @@ class ViewPictures:
             return radiance(self.reference_albedo, self.reference_direct, self.indirect[variant])
         return radiance(self.albedo, self.direct, self.indirect[variant])
 
+    def light(self, variant: str) -> Float32[np.ndarray, "height width 3"]:
+        """As `radiance`, all variants with the runtime's albedo, and black where not valid: what FLIP
+        compares."""
+        direct = self.reference_direct if variant == "reference" else self.direct
+        return radiance(self.albedo, direct, self.indirect[variant]) * self.valid[..., None]
+
 
 def write_view_pictures(path: Path, views: Sequence[Any]) -> None:
     """Write what `tuner.evaluate` made of each view (`EvaluatedView`), whole or not at all.

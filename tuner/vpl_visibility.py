@@ -95,8 +95,12 @@ def map_texels(maps: VisibilityMaps) -> MapTexels:
 @lru_cache
 def _axes(size: int) -> Float32[np.ndarray, "size size 3"]:
     """Directions of a map's texels. Twin: `visibility_axis` in GLSL."""
-    centers = (jnp.arange(size) + 0.5) * (2.0 / size) - 1.0
-    return np.asarray(hemi_octahedral_decode(jnp.stack(jnp.meshgrid(centers, centers), axis=-1)))
+    # In numpy, as `hemi_octahedral_decode`: array by array, JAX would compile each operation for itself.
+    centers = (np.arange(size, dtype=np.float32) + np.float32(0.5)) * np.float32(2.0 / size) - np.float32(1.0)
+    u, v = np.meshgrid(centers, centers)
+    x, y = (u + v) / 2.0, (u - v) / 2.0
+    direction = np.stack([x, y, 1.0 - np.abs(x) - np.abs(y)], axis=-1)
+    return (direction / np.linalg.norm(direction, axis=-1, keepdims=True)).astype(np.float32)
 
 
 def _joined(

@@ -33,6 +33,8 @@ ATTEMPTS = 60
 # Least share of rays that must meet something, and of the surfaces seen that must be lit; where the start has
 # less, relative to the start.
 LEAST_HITS, LEAST_LIT = 0.6, 0.08
+# Which random stream moves the views of a split.
+_STREAMS: dict[Split, int] = {"fitted": 0, "held_out": 1, "validation": 2}
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,29 +54,35 @@ def views_for_scene(
     lights: tuple[Light, ...],
     *,
     fitted: int,
+    validation: int = 0,
     held_out: int,
     size: tuple[int, int],
     seed: int,
 ) -> tuple[View, ...]:
-    """`fitted` views, the first of them the given camera and lights unmoved, then `held_out` ones.
+    """`fitted` views, the first of them the given camera and lights unmoved, then `validation` and
+    `held_out` ones.
 
     Each moved view has a random stream of its own, so that asking for more leaves the others as they were.
     Moved cameras and lights stay in free space in sight of where they started; a moved light keeps its kind
     and cones, and the irradiance at what it lights.
 
     Raises:
-        ValueError: `fitted` is less than 1, or `held_out` is negative.
+        ValueError: `fitted` is less than 1, or `validation` or `held_out` is negative.
     """
-    if fitted < 1 or held_out < 0:
-        raise ValueError(f"views_for_scene: fitted must be ≥ 1 and held_out ≥ 0, got {fitted} and {held_out}")
+    if fitted < 1 or min(validation, held_out) < 0:
+        raise ValueError(
+            "views_for_scene: fitted must be ≥ 1, validation and held_out ≥ 0, "
+            f"got {fitted}, {validation} and {held_out}"
+        )
     space = free_space(scene)
     sight = seen_by(space, camera)
     start = _Start(space, camera, lights, sight, lit_fraction(space, sight, lights))
     views = [View("fitted_0", "fitted", size, camera, lights)]
     splits: list[tuple[Split, int]] = [("fitted", i) for i in range(1, fitted)]
+    splits += [("validation", i) for i in range(validation)]
     splits += [("held_out", i) for i in range(held_out)]
     for split, index in splits:
-        random = np.random.default_rng([seed, split == "held_out", index])
+        random = np.random.default_rng([seed, _STREAMS[split], index])
         moved_camera, moved_lights = _moved(start, random)
         views.append(View(f"{split}_{index}", split, size, moved_camera, moved_lights))
     return tuple(views)

@@ -10,7 +10,7 @@ from renderer.artist_parameters import ArtistParameters
 from renderer.runtime import Runtime
 from renderer.tuned_config import TunedConfig
 from tuner.captured_view import CapturedView
-from tuner.fit_falloff import fit_falloff
+from tuner.fit_placement import fit_placement
 from tuner.fit_status import FitStatus
 from tuner.reference.reference_view import ReferenceView
 from tuner.search_space import SearchSpace
@@ -42,15 +42,17 @@ def test_recovery_from_a_random_start(planted_views, seed):
     """k, α and κ within 1 % from anywhere in their ranges; the tabulated surrogate accounts for most."""
     space = SearchSpace()
     start = space.parameters(np.random.default_rng(seed).random(3), PLANTED)
-    tuned, result = fit_falloff(planted_views, start)
+    fit = fit_placement(planted_views, start)
+    tuned, result = fit.parameters, fit.descent
     assert result.loss <= result.start_loss
     for name in space.names:
         assert getattr(tuned, name) == pytest.approx(getattr(PLANTED, name), rel=1e-2), name
 
 
 def test_a_fit_never_ends_above_its_start(planted_views):
-    """Started at the answer, and given one block of steps, it still does not get worse."""
-    tuned, result = fit_falloff(planted_views, PLANTED, steps=20)
+    """Started at the answer, and given one turn, it still does not get worse."""
+    fit = fit_placement(planted_views, PLANTED, turns=1)
+    tuned, result = fit.parameters, fit.descent
     assert result.loss <= result.start_loss
     assert tuned.intensity == pytest.approx(PLANTED.intensity, rel=1e-2)
 
@@ -59,9 +61,9 @@ def test_nothing_lit_is_a_status(gl_context):
     """A view without light is no error: the start is kept, and the status says why."""
     runtime = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context)
     view = drawn_by_the_runtime(runtime, None, PLANTED)
-    tuned, result = fit_falloff((view,), PLANTED)
-    assert result.status is FitStatus.NOTHING_LIT
-    assert tuned == PLANTED
+    fit = fit_placement((view,), PLANTED)
+    assert fit.descent.status is FitStatus.NOTHING_LIT
+    assert fit.parameters == PLANTED
 
 
 def test_noise_is_not_fitted(planted_views):
@@ -81,7 +83,7 @@ def test_noise_is_not_fitted(planted_views):
             **{**vars(view.reference), "irradiance_a": halves[0], "irradiance_b": halves[1]}
         )
         noisy.append(CapturedView(view.view, reference, view.captured))
-    tuned, _ = fit_falloff(tuple(noisy), ArtistParameters(vpl_count=256))
+    tuned = fit_placement(noisy, ArtistParameters(vpl_count=256)).parameters
     for name in SearchSpace().names:
         assert getattr(tuned, name) == pytest.approx(getattr(PLANTED, name), rel=2e-2), name
 

@@ -3,6 +3,7 @@
 import os
 import re
 import shlex
+from collections import Counter
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
@@ -12,6 +13,7 @@ import typer
 from renderer.errors import InputError
 from tuner.commands.options import (
     SCENE_SECONDS,
+    VIEW_COUNT,
     BouncesOption,
     JsonOption,
     SeedOption,
@@ -49,7 +51,7 @@ def batch(
         typer.Option("-o", "--output", metavar="DIR", help="Folder for records, log, and each scene's fit."),
     ],
     config: StartOption = "default",
-    views: ViewCountOption = 2,
+    views: ViewCountOption = VIEW_COUNT,
     size: ViewSizeOption = None,
     seed: SeedOption = 0,
     visibility: VisibilityOption = None,
@@ -229,16 +231,20 @@ def _report(result: "BatchResult", output: Path) -> Report:
         "output": str(output),
         "records": [as_document(record) for record in result.records],
     }
-    untuned = [record for record in result.records if record.status != "done"]
-    table = Table(title="Not tuned", title_justify="left")
+    untuned = [
+        record for record in result.records if record.status != "done" or record.fit in ("kept", "doubtful")
+    ]
+    table = Table(title="Not tuned, or not better than the start", title_justify="left")
     for heading in ("scene", "", "why"):
         table.add_column(heading, overflow="fold")
     for record in untuned:
-        table.add_row(escape(record.name), record.status, escape(record.reason))
+        table.add_row(escape(record.name), record.fit or record.status, escape(record.reason))
+    ended = Counter(record.fit for record in result.records if record.status == "done" and record.fit)
+    told = "".join(f"; {count} {fit}" for fit, count in ended.most_common())
     sentence = ", ".join(f"{count} {status}" for status, count in counts.items() if count)
     shown = (
         *((table,) if untuned else ()),
-        f"{sentence}; {result.fitted} of them in this run",
+        f"{sentence}; {result.fitted} of them in this run{told}",
         f"records: {escape(str(output / 'records'))}",
         f"report:  {escape(shlex.join(('vpltune', 'report', str(output))))}",
     )

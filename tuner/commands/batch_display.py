@@ -100,8 +100,9 @@ def ending(event: dict[str, Any]) -> str:
     if event["event"] == "attempt_failed":
         return one_line(f"{event['name']}: attempt {event['attempt']} failed: {event['reason']}")
     if event["event"] == "record":
-        why = "" if event["status"] == "done" else f": {event['reason']}"
-        return one_line(f"{event['status']} {event['name']} ({event['seconds']:.1f} s){why}")
+        status = event.get("fit") or event["status"]
+        why = "" if status in ("done", "improved") else f": {event['reason']}"
+        return one_line(f"{status} {event['name']} ({event['seconds']:.1f} s){why}")
     return ""
 
 

@@ -8,6 +8,7 @@ import typer
 from renderer.errors import InputError
 from tuner.commands.options import (
     LARGEST_VIEW_COUNT,
+    VIEW_COUNT,
     BouncesOption,
     JsonOption,
     SceneArgument,
@@ -15,7 +16,7 @@ from tuner.commands.options import (
     SplitErrorOption,
     VisibilityOption,
 )
-from tuner.commands.report import OK, PARTLY_DONE, Report, warn
+from tuner.commands.report import Report, warn
 from tuner.commands.view_options import ViewFlags, takes_view_flags
 
 
@@ -27,7 +28,7 @@ def evaluate(
     ],
     views: Annotated[
         str, typer.Option(metavar="N|FILE", help="How many views are fitted, or the views.json of a fit.")
-    ] = "2",
+    ] = str(VIEW_COUNT),
     seed: SeedOption = 0,
     visibility: VisibilityOption = None,
     bounces: BouncesOption = "1",
@@ -62,7 +63,7 @@ def evaluate(
         *error_budget_table(document),
         f"views: {escape(document['views'])}",
     )
-    return Report(document, shown, OK if document["status"] == "ok" else PARTLY_DONE)
+    return Report(document, shown)
 
 
 def _views(text: str, placed: bool) -> dict[str, Any]:

@@ -75,6 +75,8 @@ def export(
     if to == "web" and output.suffix.lower() != ".html":
         raise InputError(f"{output}: the file name must end in .html, got {output.suffix or 'no suffix'!r}")
     config = read_config(file).seen_by(visibility)
+    fit = fit_outcome(config)
+    warn(fit_warnings(config))
     if to in WITH_VIEW:
         from renderer.config_export import refuse_prior
         from tuner.commands.chosen_view import chosen_view
@@ -89,9 +91,26 @@ def export(
         "to": to,
         "visibility": config.visibility,
         "parameters": config.parameters.as_dict(),
+        **({} if fit is None else {"fit": fit}),
         "status": "ok",
     }
     return Report(document, (f"wrote {escape(str(output))}",))
+
+
+def fit_outcome(config: "TunedConfig") -> str | None:
+    """How the fit that wrote the config ended; None where no fit did, or does not say."""
+    status = config.provenance.get("status")
+    return status if isinstance(status, str) else None
+
+
+def fit_warnings(config: "TunedConfig") -> tuple[str, ...]:
+    """A sentence where what is exported is not better than the start of its fit."""
+    status = fit_outcome(config)
+    if status in (None, "improved"):
+        return ()
+    return (
+        f"this config is from a fit that ended {status}: {config.provenance.get('fit', 'no reason given')}",
+    )
 
 
 def _write(config: "TunedConfig", to: Form, output: Path, scene: Path | None) -> None:

@@ -8,6 +8,7 @@ import typer
 
 from tuner.commands.command_line import command_line
 from tuner.commands.options import (
+    VIEW_COUNT,
     BouncesOption,
     JsonOption,
     SceneArgument,
@@ -19,7 +20,7 @@ from tuner.commands.options import (
     VisibilityOption,
     parse_size,
 )
-from tuner.commands.report import OK, PARTLY_DONE, Report, warn
+from tuner.commands.report import Report, warn
 from tuner.commands.view_options import ViewFlags, takes_view_flags
 
 
@@ -31,7 +32,7 @@ def fit(
         typer.Option("-o", "--output", metavar="DIR", help="Folder for tuned.json, pictures and metrics."),
     ],
     config: StartOption = "default",
-    views: ViewCountOption = 2,
+    views: ViewCountOption = VIEW_COUNT,
     size: ViewSizeOption = None,
     seed: SeedOption = 0,
     visibility: VisibilityOption = None,
@@ -106,10 +107,10 @@ def _report(document: dict, output: Path) -> Report:
         parameters_table(document["parameters"], document["uncertainty"]),
         metrics_table(document["metrics"]),
         *error_budget_table(document),
-        f"{escape(document['sentence'])} ({document['seconds']['total']:.1f} s)",
+        escape(f"{document['status']}: {document['sentence']} ({document['seconds']['total']:.1f} s)"),
         *budget_lines(document),
         f"picture: {escape(str(output / 'comparison.png'))}",
         f"next:    {escape(shlex.join(command))}",
         f"report:  {escape(shlex.join(('vpltune', 'report', str(output))))}",
     )
-    return Report(document, shown, PARTLY_DONE if document["status"] == "failed" else OK)
+    return Report(document, shown)

@@ -16,6 +16,9 @@ LARGEST_SIDE = 16384
 """Pixels; also the rule of `views.json`."""
 
 LARGEST_VIEW_COUNT = 64
+VIEW_COUNT = 4
+"""Views that a scene is fitted to where no other number is asked for: with validation and held-out views,
+ten light positions in all."""
 
 SCENE_SECONDS = 900.0
 """That a batch gives an attempt at one scene: many times what the slowest we know takes."""
@@ -41,14 +44,20 @@ StartOption = Annotated[
     ),
 ]
 ViewCountOption = Annotated[
-    int, typer.Option("--views", min=1, max=LARGEST_VIEW_COUNT, help="How many views of a scene to fit.")
+    int,
+    typer.Option(
+        "--views",
+        min=1,
+        max=LARGEST_VIEW_COUNT,
+        help="How many views of a scene to fit; as many validate the fit, half as many are held out.",
+    ),
 ]
 BouncesOption = Annotated[
     Bounces, typer.Option(help="What the reference is: one bounce, or full global illumination.")
 ]
 ViewSizeOption = Annotated[
     str | None,
-    typer.Option("--size", metavar="WxH", help="Of the views, in pixels. [128x96]", show_default=False),
+    typer.Option("--size", metavar="WxH", help="Of the views, in pixels. [64x48]", show_default=False),
 ]
 SplitErrorOption = Annotated[
     bool, typer.Option("--split-error", help="Split the error that is left by cause; draws some more frames.")

@@ -1,8 +1,10 @@
-"""Progress of long work, on stderr: a bar on a terminal, a line per stage anywhere else."""
+"""Progress of long work, on stderr: a bar on a terminal, lines with percent and time left anywhere else."""
 
 import contextlib
 import sys
+import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 Progress = Callable[[str, float], None]
 """Called with the stage ("reference", "fit", …) and the share of it that is done, in [0, 1]."""
@@ -21,28 +23,66 @@ def shown_progress() -> Iterator[Progress]:
 @contextlib.contextmanager
 def _bars() -> Iterator[Progress]:
     from rich.console import Console
-    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        TaskProgressColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
     from rich.progress import Progress as Bars
 
-    tasks = {}
-    columns = (TextColumn("{task.description:<12}"), BarColumn(), TimeElapsedColumn())
+    tasks: dict[str, int] = {}
+    columns = (
+        TextColumn("{task.description:<12}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
     # Nothing else is redirected: with --json, stdout is not ours to draw on.
     with Bars(*columns, console=Console(stderr=True), redirect_stdout=False, redirect_stderr=False) as bars:
 
         def show(stage: str, fraction: float) -> None:
             if stage not in tasks:
+                for done in tasks.values():
+                    _finish(bars, done)
                 tasks[stage] = bars.add_task(stage, total=1.0)
             bars.update(tasks[stage], completed=fraction)
+            if fraction >= 1.0:
+                _finish(bars, tasks[stage])
 
         yield show
+        for done in tasks.values():
+            _finish(bars, done)
+
+
+def _finish(bars: Any, task: int) -> None:
+    """The stage is over: its bar is full, and its clock stands."""
+    bars.update(task, completed=1.0)
+    bars.stop_task(task)
+
+
+LINE_SECONDS = 10.0
+"""Between two lines of one stage, where there is no terminal."""
 
 
 def _line_per_stage() -> Progress:
-    named = set()
+    """A line when a stage begins, and while it goes on one every `LINE_SECONDS` with what is done and
+    left."""
+    stage_begun = ("", 0.0)
+    last_line = 0.0
 
     def show(stage: str, fraction: float) -> None:
-        if stage not in named:
-            named.add(stage)
+        nonlocal stage_begun, last_line
+        now = time.monotonic()
+        if stage != stage_begun[0]:
+            stage_begun, last_line = (stage, now), now
             print(f"vpltune: {stage}", file=sys.stderr, flush=True)
+        elif now - last_line >= LINE_SECONDS and 0.0 < fraction < 1.0:
+            last_line = now
+            left = (now - stage_begun[1]) * (1.0 - fraction) / fraction
+            print(f"vpltune: {stage} {fraction:.0%}, {left:.0f} s left", file=sys.stderr, flush=True)
 
     return show

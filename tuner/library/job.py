@@ -32,7 +32,7 @@ class JobOptions:
 
     start: str
     """Where the fit starts: the text of a config file."""
-    views: int = 2
+    views: int = 4
     seed: int = 0
     bounces: str = "1"
     size: tuple[int, int] | None = None

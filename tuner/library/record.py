@@ -26,8 +26,9 @@ class Record:
     name: str
     """The scene file as the library names it: relative to its folder."""
     status: Status
-    """`unlit`: no indirect light reaches its views, so the start is kept. `refused`: the file cannot be used,
-    whatever is tried. `failed`: every attempt failed."""
+    """`done`: fitted, whether or not that was better than the start, see `fit`. `unlit`: no indirect light
+    reaches its views, so the start is kept. `refused`: the file cannot be used, whatever is tried.
+    `failed`: every attempt failed."""
     reason: str
     """How the fit ended, or why there is none; one line."""
     seconds: float
@@ -40,6 +41,8 @@ class Record:
     """When: ISO 8601, in UTC."""
     peak_memory_bytes: int = 0
     """Most memory that the process had up to then; 0 where it is not known."""
+    fit: str = ""
+    """How a fit that was made ended: `tuner.fit_status.Outcome`; empty where there is none."""
     stages: dict[str, float] = field(default_factory=dict)
     """Seconds of each stage of the fit."""
 

@@ -68,7 +68,7 @@ def _fitted(job: Job, attempt: int, progress: Progress) -> Record:
             raise  # the output cannot be written, which is no fault of the scene's
         return _record(job, "refused", str(error), time.perf_counter() - started, attempt, "")
     document = result.document
-    status: Status = "done" if document["status"] == "ok" else document["status"]
+    status: Status = "unlit" if document["status"] == "unlit" else "done"
     return _record(
         job,
         status,
@@ -77,6 +77,7 @@ def _fitted(job: Job, attempt: int, progress: Progress) -> Record:
         attempt,
         job.output_name,
         document["seconds"],
+        document["status"],
     )
 
 
@@ -88,6 +89,7 @@ def _record(
     attempts: int,
     output: str,
     stages: dict[str, float] | None = None,
+    fit: str = "",
 ) -> Record:
     return Record(
         key=job.key,
@@ -102,5 +104,6 @@ def _record(
         finished=datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds"),
         # Linux counts in KiB.
         peak_memory_bytes=1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss if stages else 0,
+        fit=fit,
         stages=dict(stages or {}),
     )

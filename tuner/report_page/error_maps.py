@@ -6,7 +6,7 @@ Both are palette pictures, so that a map weighs a byte a pixel, and what is not 
 import io
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, UInt8
 from PIL import Image
 
 from tuner.losses.relative_squared_error import DARK_SHARE
@@ -57,6 +57,18 @@ def map_png(
     file = io.BytesIO()
     picture.save(file, "PNG", transparency=_TRANSPARENT, optimize=True)
     return file.getvalue()
+
+
+def map_pixels(
+    values: Float[np.ndarray, "height width"],
+    low: float,
+    high: float,
+    colours: tuple[str, ...],
+    valid: Bool[np.ndarray, "height width"],
+) -> UInt8[np.ndarray, "height width 3"]:
+    """The same as pixels, white where not valid."""
+    image = Image.open(io.BytesIO(map_png(values, low, high, colours, valid))).convert("RGBA")
+    return np.asarray(Image.alpha_composite(Image.new("RGBA", image.size, "white"), image).convert("RGB"))
 
 
 def _palette(colours: tuple[str, ...]) -> list[int]:

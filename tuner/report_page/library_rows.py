@@ -29,6 +29,8 @@ class TunedRow:
     energy_ratio: float | None
     flip: float | None
     seconds: float | None
+    fit: str
+    """How the fit ended: `improved`, `kept` or `doubtful`; empty where that is not known."""
     sentence: str
     thumbnails: dict[str, str]
     """data: addresses of `reference`, `default` and `tuned`; empty where the fit kept no pictures."""
@@ -64,6 +66,7 @@ def tuned_row(name: str, record: Record, fit: FitFolder, page: str) -> TunedRow:
         energy_ratio=finite(figures["tuned"].get("energy_ratio")),
         flip=finite(figures["tuned"].get("flip")),
         seconds=finite(record.seconds),
+        fit=str(fit.document.get("status", "")),
         sentence=record.reason,
         thumbnails=_thumbnails(fit, split),
     )

@@ -14,6 +14,19 @@ from tuner.report_page.view_blocks import SHOWN, ViewBlock, view_block
 from tuner.view_pictures import VARIANTS
 
 SPLITS = {"fitted": "fitted views, mean", "held_out": "held-out views, mean"}
+FIGURES = {
+    "relmse": "relMSE",
+    "trimmed_relmse": "without worst 0.1 %",
+    "worst_share": "their share",
+    "median_error": "median pixel",
+    "energy_ratio": "energy",
+    "flip": "FLIP",
+}
+CARDS = {
+    "trimmed_relmse": "relMSE without the worst 0.1 %",
+    "energy_ratio": "Energy ratio",
+    "flip": "HDR-FLIP",
+}
 VISIBILITY_WORDS = {
     "none": "VPLs without visibility",
     "transmittance": "mean transmittance for visibility",
@@ -41,7 +54,7 @@ def scene_page(fit: FitFolder, name: str | None = None, library: str | None = No
         "scene.js",
         name=name or scene_name(document),
         library=library,
-        ok=document.get("status") == "ok",
+        status=str(document.get("status", "")),
         sentence=str(document.get("sentence", "")),
         cards=_cards(document),
         total=seconds(fit.part("seconds").get("total")),
@@ -54,6 +67,7 @@ def scene_page(fit: FitFolder, name: str | None = None, library: str | None = No
         diverging=DIVERGING,
         magma=MAGMA,
         figures=_figures(fit),
+        figure_names=FIGURES,
         parameters=parameter_rows(fit.part("parameters"), fit.part("uncertainty")),
         has_uncertainty=bool(fit.part("uncertainty")),
         loss_chart=loss_chart(fit.part("loss")),
@@ -102,7 +116,7 @@ def _cards(document: Mapping[str, Any]) -> list[dict[str, str]]:
     default, tuned, ceiling = (split_figures(document, split, variant) for variant in VARIANTS)
     where = {"held_out": "held-out views", "fitted": "fitted views"}[split]
     cards = []
-    for key, what in (("relmse", "relMSE"), ("energy_ratio", "Energy ratio"), ("flip", "HDR-FLIP")):
+    for key, what in CARDS.items():
         before, after = default.get(key), tuned.get(key)
         verdict = "" if key == "energy_ratio" else change(before, after)
         notes = [verdict, f"ceiling {number(ceiling.get(key))}"]
@@ -131,10 +145,9 @@ def _figure_rows(figures: Mapping[str, Any]) -> list[dict[str, str]]:
     for variant in VARIANTS:
         known = figures.get(variant)
         known = known if isinstance(known, dict) else {}
-        relmse, energy, flip = (number(known.get(key)) for key in ("relmse", "energy_ratio", "flip"))
-        rows.append({"variant": variant, "relmse": relmse, "energy": energy, "flip": flip})
-    floor = number(figures.get("noise_floor"))
-    return [*rows, {"variant": "noise floor", "relmse": floor, "energy": "", "flip": ""}]
+        rows.append({"variant": variant, **{key: number(known.get(key)) for key in FIGURES}})
+    floor = dict.fromkeys(FIGURES, "") | {"relmse": number(figures.get("noise_floor"))}
+    return [*rows, {"variant": "noise floor", **floor}]
 
 
 def _error_budget(budget: Mapping[str, Any]) -> tuple[BarChart | None, str]:

@@ -47,7 +47,7 @@ class ViewBlock:
 
 def view_block(pictures: ViewPictures, measured: dict[str, Any]) -> ViewBlock:
     """Everything a page shows of one view. `measured` is its entry in `per_view`."""
-    valid, reference = pictures.valid, pictures.radiance("reference")
+    valid = pictures.valid
     exposures = {
         "picture": picture_exposure(pictures),
         "irradiance": _exposure(pictures.indirect["reference"], valid),
@@ -56,7 +56,8 @@ def view_block(pictures: ViewPictures, measured: dict[str, Any]) -> ViewBlock:
         name: signed_error(pictures.indirect[name], pictures.indirect["reference"], valid)
         for name in VARIANTS
     }
-    flip = {name: hdr_flip_map(pictures.radiance(name), reference) for name in VARIANTS}
+    light = pictures.light("reference")
+    flip = {name: hdr_flip_map(pictures.light(name), light) for name in VARIANTS}
     everywhere = np.ones_like(valid)
     height, width = valid.shape
     return ViewBlock(

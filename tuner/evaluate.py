@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float32
 
@@ -186,7 +187,7 @@ def surrogate_irradiance(
     # Views of one size have differing numbers of receivers; repeating some shares the compiled gather.
     repeated = np.arange(count + -count % PIXELS_STEP) % max(count, 1)
     receivers, vpls = gather_inputs(view.captured, repeated)
-    seen = None if visibility is None else np.asarray(visibility, np.float32)[repeated]
+    seen = None if visibility is None else jnp.asarray(visibility, jnp.float32)[repeated]
     picture = np.zeros((*valid.shape, 3), np.float32)
     gathered = _gather(receivers, vpls, FalloffParameters.of(parameters), seen)
     picture[valid] = np.asarray(gathered)[:count]

@@ -34,8 +34,9 @@ from tuner.losses.relative_squared_error import target_of, weighted_squared_erro
 from tuner.losses.robust_error import RobustError
 from tuner.search_space import held_for
 
-ROTATIONS = 8
-"""Of each view. The first is none at all, which is the one that the runtime draws with."""
+ROTATIONS = 4
+"""Of each view, so that four views have sixteen placements. The first is none at all, which is the one that the runtime
+draws with."""
 HELD_OUT_ROTATIONS = 8
 FEW_VPLS = 256
 """Up to this many, the fit sees several rotations and the density is fitted; beyond, one placement is as good

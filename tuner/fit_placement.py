@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
@@ -120,5 +121,9 @@ def _cost(
     pictures = [_picture(view.table, parameters) for view in views]
     if errors is None:
         targets = [view.target for view in views]
-        return float(np.mean([weighted_squared_error(y, t) for y, t in zip(pictures, targets, strict=True)]))
+        return float(
+            np.mean(
+                [weighted_squared_error(jnp.asarray(y), t) for y, t in zip(pictures, targets, strict=True)]
+            )
+        )
     return float(np.mean([error.cost(y) for y, error in zip(pictures, errors, strict=True)]))

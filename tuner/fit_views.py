@@ -87,7 +87,7 @@ def view_pixels(
         half.reshape(-1, 3)[pixels] for half in (view.reference.irradiance_a, view.reference.irradiance_b)
     )
     # As numbers, which a view with maps has too: one compiled gather serves both.
-    known = None if visibility is None else visibility[chosen].astype(np.float32)
+    known = None if visibility is None else jnp.asarray(visibility[chosen], jnp.float32)
     return ViewPixels(receivers, vpls, overlap, known, half_a, half_b, pixels, view.view.size)
 
 

@@ -41,7 +41,7 @@ def test_names_splits_and_the_first_view():
 @pytest.mark.parametrize(("fitted", "held_out"), [(0, 2), (1, -1)])
 def test_counts_are_checked(fitted, held_out):
     scene, start = colored_room(), room_view()
-    with pytest.raises(ValueError, match=r"fitted must be ≥ 1 and held_out ≥ 0, got"):
+    with pytest.raises(ValueError, match=r"fitted must be ≥ 1, validation and held_out ≥ 0, got"):
         views_for_scene(
             scene, start.camera, start.lights, fitted=fitted, held_out=held_out, size=SIZE, seed=0
         )

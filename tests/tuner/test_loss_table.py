@@ -26,6 +26,7 @@ from tuner.loss_table import (
     table_loss,
 )
 from tuner.losses.relative_squared_error import target_of, weighted_squared_error
+from tuner.losses.robust_error import robust_error
 from tuner.reference.reference_view import ReferenceView
 from tuner.virtual_point_lights import gather_inputs
 from tuner.vpl_gather import FalloffParameters, gather
@@ -72,7 +73,10 @@ def direct_loss(view: CapturedView, point: np.ndarray) -> float:
     seen = map_visibility(view.captured, receivers, vpls, parameters)
     flat = np.flatnonzero(view.captured.valid.ravel())[pixels]
     halves = (view.reference.irradiance_a, view.reference.irradiance_b)
-    target = target_of(*(half.reshape(-1, 3)[flat] for half in halves))
+    images = (view.reference.irradiance, view.reference.direct_irradiance, view.captured.indirect_irradiance)
+    reference, direct, drawn = (image.reshape(-1, 3)[flat] for image in images)
+    weight = robust_error(reference, direct, drawn).weights(drawn)
+    target = target_of(*(half.reshape(-1, 3)[flat] for half in halves), weight)
     picture = gather(receivers, vpls, FalloffParameters.of(parameters), seen)
     return float(weighted_squared_error(picture, target))
 

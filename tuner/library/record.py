@@ -41,10 +41,10 @@ class Record:
     """When: ISO 8601, in UTC."""
     peak_memory_bytes: int = 0
     """Most memory that the process had up to then; 0 where it is not known."""
-    fit: str = ""
-    """How a fit that was made ended: `tuner.fit_status.Outcome`; empty where there is none."""
     stages: dict[str, float] = field(default_factory=dict)
     """Seconds of each stage of the fit."""
+    fit: str = ""
+    """How a fit that was made ended: `tuner.fit_status.Outcome`; empty where there is none."""
 
 
 class Records:

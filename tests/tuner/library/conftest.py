@@ -32,7 +32,7 @@ def make_job(tmp_path):
 @pytest.fixture
 def fits(monkeypatch):
     """Takes the place of a fit: which scenes were fitted, and what each ends with."""
-    log = SimpleNamespace(scenes=[], error=None, status="ok", files={"tuned.json": "{}"})
+    log = SimpleNamespace(scenes=[], error=None, status="improved", files={"tuned.json": "{}"})
 
     def fit_scene(scene_path, output, options, progress):
         log.scenes.append(scene_path.name)

@@ -80,12 +80,15 @@ def test_an_attempt_that_fails_leaves_no_record_and_no_claim(make_job, fits, err
     assert not job.claim.exists()
 
 
-@pytest.mark.parametrize("status", ["unlit", "failed"])
-def test_a_fit_with_nothing_to_fit_keeps_its_output(make_job, fits, status):
+@pytest.mark.parametrize(
+    ("outcome", "status"),
+    [("improved", "done"), ("kept", "done"), ("doubtful", "done"), ("unlit", "unlit")],
+)
+def test_a_record_says_how_the_fit_ended(make_job, fits, outcome, status):
     job = make_job()
-    fits.status = status
+    fits.status = outcome
     record = tune_one(job)
-    assert (record.status, record.output) == (status, job.output_name)
+    assert (record.status, record.fit, record.output) == (status, outcome, job.output_name)
 
 
 def test_set_aside_keeps_the_reason_and_yields_to_a_record(make_job, fits):

@@ -231,6 +231,7 @@ def test_a_large_library_stays_within_the_pages_size(tmp_path):
         energy_ratio=1.0,
         flip=0.1,
         seconds=10.0,
+        fit="improved",
         sentence="the loss has settled",
         thumbnails={"reference": thumbnail, "tuned": thumbnail},
     )

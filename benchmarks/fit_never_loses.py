@@ -22,6 +22,7 @@ from benchmarks.row import Row
 from benchmarks.scene_library import REPOSITORY, present_scenes
 from renderer.atomic_file import write_text_whole
 from renderer.strict_json import strict_json
+from tuner.guard import UNSEEN
 
 SEED = 20261129
 """Of the generator: chosen nothing on, and drawn for this measurement alone."""
@@ -38,8 +39,6 @@ MEDIAN_LIMITS = {"default": 0.90, "few": 0.5}
 """Of the trimmed relMSE's ratio."""
 WORKERS = 2
 SOURCES = ("renderer", "tuner", "shaders", "configs")
-UNSEEN = {"relmse": 1e-5, "trimmed_relmse": 1e-5, "flip": 1e-3, "median_error": 1e-3}
-"""Added to both sides, as `tuner.guard.UNSEEN`: ratios of what nobody sees say nothing."""
 
 
 @dataclass(frozen=True)

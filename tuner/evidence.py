@@ -38,7 +38,7 @@ def doubts(fitted: Sequence[CapturedView], validation: Sequence[CapturedView]) -
     pixels = sum(int(view.reference.irradiance[view.valid].any(axis=-1).sum()) for view in validation)
     if pixels < LEAST_PIXELS:
         found.append(
-            f"the validation views have only {pixels} lit pixels to judge by, {LEAST_PIXELS} are needed"
+            f"the validation views have only {pixels} lit pixels, {LEAST_PIXELS} are needed to judge by"
         )
     close = [view for view in views if _is_close(view)]
     if 2 * len(close) > len(views) or (fitted and _is_close(fitted[0])):

@@ -35,7 +35,7 @@ from tuner.losses.robust_error import RobustError
 from tuner.search_space import held_for
 
 ROTATIONS = 4
-"""Of each view, so that four views have sixteen placements. The first is none at all, which is the one that the runtime
+"""Of each view, so that four views have sixteen placements. The first is none at all: what the runtime
 draws with."""
 HELD_OUT_ROTATIONS = 8
 FEW_VPLS = 256

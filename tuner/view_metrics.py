@@ -53,19 +53,19 @@ def trimmed_relmse(
 ) -> tuple[float, float]:
     """relMSE without the worst `WORST_SHARE` of the pixels, and the share of it that those hold.
 
-    Both are NaN against a black reference or where no pixel is left, the share 0 where there is no error.
+    One pixel is always kept. Both are NaN against a black reference, the share 0 where there is no error.
     """
     errors = np.sort(squared_errors(picture, reference))
-    kept = errors[: len(errors) - math.ceil(WORST_SHARE * len(errors))]
-    if not kept.size:
+    if not errors.size:
         return math.nan, math.nan
+    kept = errors[: max(1, len(errors) - math.ceil(WORST_SHARE * len(errors)))]
     total = float(errors.sum())
     return float(kept.mean()), 1.0 - float(kept.sum()) / total if total > 0.0 else 0.0
 
 
 def squared_errors(
     picture: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]
-) -> Float64[np.ndarray, " pixels"]:
+) -> Float64[np.ndarray, " measured"]:
     """What each pixel adds to the relMSE, times their number; none against a black reference."""
     y, r = picture.astype(np.float64), reference.astype(np.float64)
     denominator = r**2 + DARK_SHARE * r.mean() ** 2 if r.size else r

@@ -45,12 +45,13 @@ class RobustError:
     scale: float
     """s, relative."""
 
+    def costs(self, picture: Float[np.ndarray, "receivers 3"]) -> Float64[np.ndarray, " receivers"]:
+        """ρ at every receiver for an image y [W/m²]."""
+        return 2.0 * self.scale**2 * (np.hypot(1.0, self._error(picture) / self.scale) - 1.0)
+
     def cost(self, picture: Float[np.ndarray, "receivers 3"]) -> float:
         """The mean of ρ over the receivers for an image y [W/m²]; 0 without receivers."""
-        error = self._error(picture)
-        if not error.size:
-            return 0.0
-        return float(np.mean(2.0 * self.scale**2 * (np.hypot(1.0, error / self.scale) - 1.0)))
+        return float(self.costs(picture).mean()) if len(picture) else 0.0
 
     def weights(self, picture: Float[np.ndarray, "receivers 3"]) -> Float64[np.ndarray, "receivers 3"]:
         """What each value of the image weighs in the next least-squares step, over the number of values."""

@@ -322,10 +322,10 @@ def _main(names: Sequence[str]) -> None:
         print(f"{row.name:45s} {row.value:10.4g} {row.against_value:10.4g} {row.ratio:8.3f}  {row.against}")
 
 
-if __name__ == "__main__":
-    _main(sys.argv[1:])
-
-
 def _fit(views: Sequence[CapturedView], start: ArtistParameters) -> PlacementFit:
     """The least relMSE: one measure for all densities and counts."""
     return fit_placement(views, start)
+
+
+if __name__ == "__main__":
+    _main(sys.argv[1:])

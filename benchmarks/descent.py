@@ -1,6 +1,6 @@
 """Whether a fit of the falloff ends at the same place wherever it starts, and in how many steps.
 
-Every scene that can be loaded, two views, the default config: from `STARTS` random points of the unit cube,
+Every scene that can be loaded, four views, the default config: from `STARTS` random points of the unit cube,
 and from the defaults, there beside Adam (Kingma and Ba 2015), which moves k like the others.
 """
 

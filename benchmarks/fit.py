@@ -55,7 +55,7 @@ def _fit_seconds(folder: Path) -> float:
         command, env={**os.environ, "VPLTUNE_CACHE": str(folder / "cache")}, capture_output=True, check=True
     )
     seconds = time.perf_counter() - started
-    if json.loads(finished.stdout)["status"] != "ok":
+    if json.loads(finished.stdout)["status"] not in ("improved", "kept"):
         raise RuntimeError(f"the fit did not end well: {finished.stdout.decode()}")
     return seconds
 

@@ -3,9 +3,7 @@
 All continuous parameters are free: k, α, κ, β, σ, γ and η, of few VPLs with visibility maps and cells.
 Everyone minimises relMSE, the searches by drawing every view with the real runtime at ROTATIONS rotations of
 the point table, reading it back and comparing it. Ours is `tuner.fit_density` on the same views and
-rotations. (Its own loss adds plain squared error, which β and σ at the ends of their ranges lower: they blur
-the shadows of few VPLs and fill dark corners with light, and in one room a tenth off that loss was twice the
-relMSE.)
+rotations, told to minimise relMSE as well and not its own robust error.
 
 The surrogate does not know where VPLs will stand, so it takes the runtime's place for the first five of the
 seven: a search with `_surrogate` has the placements that ours tried, in that order, each captured anew, and

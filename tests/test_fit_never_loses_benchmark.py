@@ -44,4 +44,5 @@ def test_every_scene_is_fitted_in_both_modes_and_the_seed_is_not_that_of_the_pri
     assert sorted({cell.mode for cell in wanted}) == ["default", "few"]
     assert len({cell.file for cell in wanted}) == len(wanted)
     assert sum(isinstance(cell.scene, int) for cell in wanted) == 64
-    assert SEED != 0
+    # The rule of docs/chosen_on.md.
+    assert SEED % 3 == 2

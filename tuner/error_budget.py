@@ -5,10 +5,10 @@ Every share is the relMSE that goes away with its cause, over the fitted views:
 - `noise`: the reference's own, which no picture is without.
 - `finite_n`: with R rotations of the point table, errors E₁ of single pictures and E_R of their mean,
   infinitely many rotations would leave E = E_R − (E₁ − E_R)/(R − 1): the variance of a mean falls as 1/R.
-- `clamping`: that E, less the error with eight times the VPLs, whose footprints, and with them the reach of
-  α, are √8 times smaller. (α = 0 in their place would measure the bright dots that α is there to prevent.)
-- `visibility`: the tuned picture, less the ceiling's, which is the same VPLs with rays for visibility.
-- `filter`: the runtime's picture, less a plain gather's of the same VPLs.
+- `clamping`: that E, less the error with eight times the VPLs (of clustered discs, at most 4,096), whose
+  footprints, and with them the reach of α, are √8 times smaller. (α = 0 in their place would measure the
+bright dots that α is there to prevent.) - `visibility`: the tuned picture, less the ceiling's, which is the
+same VPLs with rays for visibility. - `filter`: the runtime's picture, less a plain gather's of the same VPLs.
 - `missing_bounces`: against all bounces, less against one, where all bounces were asked for.
 - `remainder`: what these leave. Causes act on each other, so it may be negative, as may any share whose cause
   makes up for another's.
@@ -21,6 +21,7 @@ from statistics import fmean
 import numpy as np
 
 from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
+from renderer.passes.vpl_cells import LARGEST_COUNT
 from renderer.runtime import Runtime
 from tuner.captured_view import CapturedView, runtime_irradiance
 from tuner.evaluate import EvaluatedView, Evaluation, surrogate_irradiance
@@ -66,7 +67,9 @@ def _of_view(
     view, tuned = evaluated.view, evaluated.tuned
     total = evaluated.metrics["tuned"].relmse
     single, endless = _errors_of_rotations(runtime, view, tuned)
-    many = replace(tuned, vpl_count=int(min(MORE_VPLS * tuned.vpl_count, _MOST_VPLS)))
+    # More clustered discs than that are drawn as points: another model, and no measure of clamping.
+    most = LARGEST_COUNT if tuned.density_relaxation > 0 else _MOST_VPLS
+    many = replace(tuned, vpl_count=int(min(MORE_VPLS * tuned.vpl_count, max(most, tuned.vpl_count))))
     shares = {
         "noise": evaluated.noise_floor,
         "finite_n": single - endless,

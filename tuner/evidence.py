@@ -5,7 +5,7 @@ from statistics import fmean
 
 import numpy as np
 
-from renderer.artist_parameters import ArtistParameters, parameter_spec
+from renderer.artist_parameters import ArtistParameters
 from tuner.captured_view import CapturedView
 from tuner.reference.reference_view import noise_floor
 from tuner.uncertainty import Interval
@@ -13,10 +13,11 @@ from tuner.uncertainty import Interval
 LEAST_LIT_VIEWS = 2
 """Validation views that light must reach: a spread needs two."""
 LEAST_PIXELS = 256
-"""Of all validation views together, that see a surface and are lit. A choice: a tenth of one default view."""
+"""Lit pixels that all validation views must have together. A choice: a twelfth of one view of the default
+size."""
 CLOSE = 0.03
-"""Of L: a camera whose median depth is less stands against a surface, or sees next to nothing of what is
-lit."""
+"""Share of L: a camera whose median depth is less stands against a surface, or sees next to nothing of what
+is lit."""
 MOST_DISAGREEMENT = 0.1
 """Share of the pixels at which runtime and reference may see two surfaces. A choice: edges make up some 2
 %, a camera inside a surface that the near plane cuts away most of an image."""
@@ -63,23 +64,23 @@ def doubts(fitted: Sequence[CapturedView], validation: Sequence[CapturedView]) -
     return tuple(found)
 
 
-def undetermined(
-    known: dict[str, Interval], tuned: ArtistParameters, start: ArtistParameters
-) -> tuple[str, ...]:
-    """A sentence for each fitted parameter that the views leave open, or that is at a bound of its range."""
+def undetermined(known: dict[str, Interval], written: ArtistParameters) -> tuple[str, ...]:
+    """A sentence for each fitted parameter that the views leave open, or that ran to a bound of its range.
+
+    Args:
+        known: what the fit knows of each parameter.
+        written: what the fit ends with.
+    """
     found = []
     for name, interval in known.items():
-        spec = parameter_spec(name)
-        value = getattr(tuned, name)
+        if interval.determined:
+            continue
         if interval.at_bound is not None:
             why = f"it ran to the bound {interval.at_bound:g} of its range"
-        elif value in (spec.low, spec.high) and value != getattr(start, name):
-            why = "it is at a bound of its range"
-        elif not interval.determined:
-            why = f"its interval is {interval.low:.3g} to {interval.high:.3g}"
         else:
-            continue
-        found.append(f"{name} is not determined by these views: {why}; {value:.4g} is kept")
+            why = f"its interval is {interval.low:.3g} to {interval.high:.3g}"
+        value = getattr(written, name)
+        found.append(f"{name} is not determined by these views: {why}; {value:.4g} is written")
     return tuple(found)
 
 

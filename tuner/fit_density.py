@@ -162,7 +162,7 @@ def fit_density(
             fit = fit_placement(drawn, parameters, errors, seed=seed, held=held)
             fits[density] = fit.parameters, fit.descent
             if progress is not None:
-                progress(min(len(fits) / _TRIALS, 1.0))
+                progress(min(len(fits) / _TRIALS, 0.99))
         return fits[density][1]
 
     def result() -> DensityFit:

@@ -41,7 +41,8 @@ class PlacementFit:
     descent: Descent
     """Its losses are the cost at the start and after every turn."""
     views: tuple[FitView, ...]
-    """Ready for `tuner.uncertainty`, with the visibility and the weights of the last turn."""
+    """Ready for `tuner.uncertainty`, with the best parameters' visibility and the weights of the last
+    turn."""
 
 
 def fit_placement(
@@ -96,15 +97,33 @@ def fit_placement(
             progress((turn + 1) / turns)
         if costs[-2] - costs[-1] <= SETTLED * abs(costs[-1]):
             break
-    return _best(costs, found, tuple(ready))
-
-
-def _best(costs: list[float], found: list[ArtistParameters], ready: tuple[FitView, ...]) -> PlacementFit:
-    best = int(np.argmin(costs))
+    # A cost that is not a number is not the least.
+    best = int(np.argmin(np.where(np.isnan(costs), np.inf, costs)))
+    if found[best] != current:
+        ready = [
+            each.ready(each.table(found[best]), np.asarray(view.target.weight))
+            for each, view in zip(pixels, ready, strict=True)
+        ]
     status = FitStatus.CONVERGED if best > 0 else FitStatus.NO_IMPROVEMENT
     point = SearchSpace().point(found[best])
     descent = Descent(point, costs[best], costs[0], np.array(costs), status)
-    return PlacementFit(found[best], descent, ready)
+    return PlacementFit(found[best], descent, tuple(ready))
+
+
+def ready_views(
+    views: Sequence[CapturedView],
+    parameters: ArtistParameters,
+    errors: Sequence[RobustError],
+    *,
+    seed: int = 0,
+) -> tuple[FitView, ...]:
+    """The views with the weights and the visibility that they have at `parameters`, which are not fitted."""
+    ready = []
+    for view, error in zip(views, errors, strict=True):
+        pixels = view_pixels(view, seed=seed)
+        table = pixels.table(parameters)
+        ready.append(pixels.ready(table, error.weights(_picture(table, parameters))))
+    return tuple(ready)
 
 
 _gather_tabulated = jax.jit(gather_tabulated)

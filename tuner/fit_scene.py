@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters, parameter_spec, placement
+from renderer.artist_parameters import ArtistParameters, parameter_spec, placement
 from renderer.atomic_file import write_text_whole
 from renderer.auto_prior import AUTO_PARAMETERS, place_of, value_at
 from renderer.errors import InputError
+from renderer.runtime import Runtime
 from renderer.strict_json import strict_json
 from renderer.tuned_config import TunedConfig, read_config, write_config
 from renderer.views import write_views
@@ -31,10 +32,11 @@ from tuner.prepare_scene import PreparedScene, Progress, SceneOptions, Stopwatch
 from tuner.reference.content_key import scene_digest
 from tuner.search_space import SearchSpace
 from tuner.validation import candidates, validation_metrics
+from tuner.view_metrics import ViewMetrics
 from tuner.view_pictures import write_view_pictures
 
 VALIDATION_ROTATIONS = 4
-"""Of the point table, that few VPLs are drawn with in each validation view: one placement is mostly luck."""
+"""Rotations of the point table in each validation view with few VPLs: a single placement is mostly luck."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,12 +45,14 @@ class FitOptions(SceneOptions):
 
     density: fit to several rotations of the point table, and where the VPLs stand with it.
     budget: fit to a frame's time, the count and how the frame is drawn with it; see `tuner.fit_budget`.
+    motion: whether the result must also be as steady as the start while lights move.
     command: what was typed, for the record; None where the fit was asked for from Python.
     """
 
     start: TunedConfig = field(default_factory=TunedConfig)
     density: bool = False
     budget: BudgetOptions | None = None
+    motion: bool = False
     command: str | None = None
 
 
@@ -207,9 +211,8 @@ def _judged(
     baseline = replace(start.parameters, vpl_count=found.tuned.vpl_count)
     with watch.stage("validate"):
         chosen, doubt = _validated(prepared, baseline, found, options, progress)
-    notes = undetermined(found.known, found.tuned, baseline)
     if found.descent.status is FitStatus.NOT_FINITE:
-        doubt = (*doubt, found.descent.status.value)
+        doubt = (*doubt, "the loss at the start is not a finite number")
     status: Outcome
     if doubt:
         status, sentence, parameters = "doubtful", f"{'; '.join(doubt)}; the start is kept", baseline
@@ -218,13 +221,25 @@ def _judged(
     else:
         assert chosen is not None, "nothing is in doubt, so the candidates were judged"
         status, sentence, parameters = "kept", chosen.sentence, baseline
+    # The intervals are those of the tuned parameters: of others they say where the optimum lies, and no more.
+    known = {
+        name: replace(
+            interval,
+            value=float(getattr(parameters, name)),
+            determined=interval.determined and parameters == found.tuned,
+        )
+        for name, interval in found.known.items()
+    }
+    notes = undetermined(found.known, parameters)
+    if found.document.keys() & {"budget", "pareto"} and parameters != found.tuned:
+        notes = (*notes, "the budget's figures are those of what was found, not of the start that is kept")
     return _Found(
         status,
         sentence,
         parameters,
         baseline,
         found.descent,
-        found.known,
+        known,
         chosen,
         found.views,
         notes,
@@ -242,20 +257,32 @@ def _validated(
     """What the validation views choose, and what speaks against judging by them."""
     auto = _auto_candidate(prepared, start, options)
     tried = candidates(start, found.base, found.tuned, auto)
-    count = VALIDATION_ROTATIONS if options.density or options.budget is not None else 1
+    # The first is what the runtime draws with; the others are not those that a density was fitted to.
+    rotations = table_rotations(VALIDATION_ROTATIONS - 1, options.seed, held_out=True)
+    few = options.density or options.budget is not None
     metrics, captured = validation_metrics(
         prepared.runtime,
         prepared.validation,
         {"start": start, **tried},
-        table_rotations(count, options.seed),
-        lambda share: progress("validate", share),
+        ((0.0, 0.0), *rotations) if few else ((0.0, 0.0),),
+        motion=options.motion,
+        progress=lambda share: progress("validate", share),
     )
+    if options.start.auto is not None and options.budget is None:
+        metrics["start"] = _prior_metrics(prepared, options.start)
     fitted = [view for view in prepared.views if view.view.split == "fitted"]
     doubt = doubts(fitted, captured)
     if len(metrics["start"]) < 2:
         return None, doubt
     judged = {name: (parameters, metrics[name]) for name, parameters in tried.items()}
     return verdict(metrics["start"], judged), doubt
+
+
+def _prior_metrics(prepared: PreparedScene, start: TunedConfig) -> list[ViewMetrics]:
+    """The start's own, where a prior sets its parameters anew in each validation view."""
+    runtime = Runtime(prepared.scene, start, context=prepared.runtime.context)
+    drawn = [CapturedView(view, reference, runtime.capture(view)) for view, reference in prepared.validation]
+    return [view.metrics(view.captured.indirect_irradiance) for view in drawn if view.lit]
 
 
 def _auto_candidate(
@@ -295,7 +322,7 @@ def _evaluated(prepared: PreparedScene, found: _Found, options: FitOptions, prog
             prepared.runtime.parameters = tuned
             same = list(capture_views(prepared.runtime, (view.view,), (view.reference,)))
         views.append(same[0])
-    kept_prior = found.parameters == found.start and options.start.auto is not None
+    kept_prior = _keeps_prior(found, options)
     return evaluate(
         prepared.scene,
         prepared.runtime,
@@ -326,9 +353,14 @@ def _mean_parameters(rest: ArtistParameters, drawn: Sequence[ArtistParameters]) 
 
 
 def default_like(start: ArtistParameters) -> ArtistParameters:
-    """The defaults at the start's own cost: what is not fitted is the same in all that is compared."""
-    kept = {spec.name: getattr(start, spec.name) for spec in ARTIST_PARAMETERS if not spec.fitted}
-    return ArtistParameters(**{**ArtistParameters().as_dict(), **kept})
+    """The defaults with the start's VPL count and screen-space near field, which no fit changes."""
+    kept = ("vpl_count", "screen_space_radius", "screen_space_strength")
+    return replace(ArtistParameters(), **{name: getattr(start, name) for name in kept})
+
+
+def _keeps_prior(found: _Found, options: FitOptions) -> bool:
+    """Whether the start was kept, and has a prior; a budget's start is what the prior set on average."""
+    return found.parameters == found.start and options.start.auto is not None and options.budget is None
 
 
 def _config(prepared: PreparedScene, found: _Found, options: FitOptions) -> TunedConfig:
@@ -344,7 +376,6 @@ def _config(prepared: PreparedScene, found: _Found, options: FitOptions) -> Tune
         "status": found.status,
         "fit": found.sentence,
     }
-    if found.parameters == found.start and options.start.auto is not None:
-        # The start was kept, and the start has a prior.
+    if _keeps_prior(found, options):
         return replace(options.start, provenance=provenance)
     return TunedConfig(found.parameters, provenance, options.start.visibility)

@@ -12,12 +12,12 @@ from tuner.captured_view import CapturedView, capture_views
 from tuner.choose_placement import choose_placement
 from tuner.fit_budget import BudgetOptions, fit_to_budget
 from tuner.fit_density import density_document, fit_density, with_cells
-from tuner.fit_placement import fit_placement
+from tuner.fit_placement import fit_placement, ready_views
 from tuner.fit_status import Descent
 from tuner.fit_views import robust_errors
 from tuner.prepare_scene import PreparedScene
 from tuner.search_space import SearchSpace, held_for
-from tuner.uncertainty import Interval, fit_with_intervals, intervals
+from tuner.uncertainty import Interval, fit_with_intervals, open_intervals
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,14 +108,15 @@ def _recaptured(
         density_importance=tuned.density_importance,
     )
     if tuned.density_relaxation > 0:
-        base = with_cells(base, tuned.density_relaxation)
+        # Discs begin at α = 1, whatever the start's points had; a start with discs keeps its α.
+        base = replace(with_cells(base), density_relaxation=tuned.density_relaxation)
     prepared.runtime.parameters = tuned
     captured = capture_views(
         prepared.runtime, tuple(view.view for view in views), tuple(view.reference for view in views)
     )
     if descent.status.nothing_fitted:
         return Search(base, tuned, descent, {}, captured, found)
-    # Of one rotation: several of one view err together, and would pass for so many witnesses.
-    ready = fit_placement(captured, tuned, robust_errors(captured, seed=seed), seed=seed, turns=1).views
+    # One rotation a view: several of one view err together, and would count as independent witnesses.
+    ready = ready_views(captured, tuned, robust_errors(captured, seed=seed), seed=seed)
     names = frozenset(SearchSpace().names) - held_for(start.visibility)
-    return Search(base, tuned, descent, intervals(ready, tuned, names), captured, found)
+    return Search(base, tuned, descent, open_intervals(ready, tuned, names, base), captured, found)

@@ -18,22 +18,26 @@ from renderer.artist_parameters import ArtistParameters
 from tuner.view_metrics import ViewMetrics
 
 MEASURES = ("relmse", "trimmed_relmse", "median_error", "flip")
+"""What a candidate is judged by; by its flicker too, where that was measured."""
 WORDS = {
     "relmse": "relMSE",
     "trimmed_relmse": "trimmed relMSE",
     "median_error": "median pixel error",
     "flip": "FLIP",
+    "flicker": "flicker",
 }
 CONFIDENCE = 0.9
 TOLERANCE = 1.02
 """Ratio to the start up to which a measure counts as not worse: what a fit promises on views that chose
 nothing."""
+LEAST_GAIN = 0.99
+"""Ratio to the start below which a measure counts as better. A choice: less than 1 % is not worth a
+change."""
 ENERGY_TOLERANCE = 0.01
 """Of |1 − energy ratio|, the mean over views."""
-UNSEEN = {"relmse": 1e-5, "trimmed_relmse": 1e-5, "median_error": 1e-3, "flip": 1e-3}
-"""Added to both sides of a ratio: errors as small as these are not seen, and their ratios say nothing. A
-tenth of a per cent of error in the median pixel; relMSE as (0.3 %)²; the least difference that FLIP's
-authors call visible is some fifty times this."""
+UNSEEN = {"relmse": 1e-5, "trimmed_relmse": 1e-5, "median_error": 1e-3, "flip": 1e-3, "flicker": 1e-3}
+"""Added to both sides of a ratio, so that errors too small to see do not decide. A choice: 0.1 % of error
+in the median pixel, 0.3 % root mean square in relMSE, and a FLIP of 0.001."""
 PREFERRED = 0.99
 """Score from which on a candidate takes the place of an earlier, simpler one."""
 
@@ -50,20 +54,21 @@ class Judgement:
     """The ratio that each measure stays below with CONFIDENCE."""
     energy_change: float
     """Change of the mean of |1 − energy ratio|; below 0 is better."""
-    means_worse: tuple[str, ...]
-    """Measures whose mean over views is above TOLERANCE times the start's, whatever the single views say."""
+    means_worse: dict[str, float]
+    """The ratio of the means over views, of measures in which it is above TOLERANCE whatever single views
+    say."""
 
     @property
     def better(self) -> tuple[str, ...]:
-        """Measures that are better beyond their margin."""
-        return tuple(name for name in MEASURES if self.bounds[name] < 1.0)
+        """Measures that are better by `LEAST_GAIN` beyond their margin."""
+        return tuple(name for name in MEASURES if self.bounds[name] < LEAST_GAIN)
 
     @property
     def worse(self) -> tuple[str, ...]:
         """Measures that may be worse, in words with the ratio that they may reach."""
         measures = [
-            f"{WORDS[name]} up to ×{self.bounds[name]:.2f}"
-            for name in MEASURES
+            f"{WORDS[name]} up to ×{max(self.bounds[name], self.means_worse.get(name, 0.0)):.2f}"
+            for name in self.bounds
             if self.bounds[name] > TOLERANCE or name in self.means_worse
         ]
         if self.energy_change > ENERGY_TOLERANCE:
@@ -78,7 +83,7 @@ class Judgement:
     @property
     def score(self) -> float:
         """Geometric mean of the ratios."""
-        return math.exp(fmean(math.log(ratio) for ratio in self.ratios.values()))
+        return math.exp(fmean(math.log(self.ratios[name]) for name in MEASURES))
 
 
 @dataclass(frozen=True)
@@ -120,8 +125,12 @@ def verdict(
         start: metrics of the start in each validation view that light reaches; two or more.
         candidates: parameters and metrics in the same views, by name.
     """
+    if not _finite(start):
+        return Verdict(None, (), "the start's images hold what is no number; the start is kept")
     judged = tuple(
-        judgement(name, parameters, start, metrics) for name, (parameters, metrics) in candidates.items()
+        judgement(name, parameters, start, metrics)
+        for name, (parameters, metrics) in candidates.items()
+        if _finite(metrics)
     )
     chosen: Judgement | None = None
     for each in judged:
@@ -130,12 +139,17 @@ def verdict(
     return Verdict(chosen, judged, _sentence(chosen, judged, len(start)))
 
 
+def _finite(metrics: Sequence[ViewMetrics]) -> bool:
+    return all(math.isfinite(getattr(each, name)) for each in metrics for name in (*MEASURES, "energy_ratio"))
+
+
 def judgement(
     name: str, parameters: ArtistParameters, start: Sequence[ViewMetrics], metrics: Sequence[ViewMetrics]
 ) -> Judgement:
     """One candidate against the start over the same views, two or more."""
-    ratios, bounds, means_worse = {}, {}, []
-    for measure in MEASURES:
+    ratios, bounds, means_worse = {}, {}, {}
+    flickers = all(math.isfinite(each.flicker) for each in (*start, *metrics))
+    for measure in (*MEASURES, "flicker") if flickers else MEASURES:
         unseen = UNSEEN[measure]
         pairs = [(getattr(a, measure), getattr(b, measure)) for a, b in zip(start, metrics, strict=True)]
         logs = [math.log((after + unseen) / (before + unseen)) for before, after in pairs]
@@ -144,11 +158,11 @@ def judgement(
         bounds[measure] = math.exp(fmean(logs) + student * stdev(logs) / math.sqrt(len(logs)))
         before, after = (fmean(values) + unseen for values in zip(*pairs, strict=True))
         if after > TOLERANCE * before:
-            means_worse.append(measure)
+            means_worse[measure] = after / before
     energy = fmean(abs(1.0 - each.energy_ratio) for each in metrics) - fmean(
         abs(1.0 - each.energy_ratio) for each in start
     )
-    return Judgement(name, parameters, ratios, bounds, energy, tuple(means_worse))
+    return Judgement(name, parameters, ratios, bounds, energy, means_worse)
 
 
 def _sentence(chosen: Judgement | None, judged: Sequence[Judgement], views: int) -> str:

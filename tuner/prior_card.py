@@ -31,7 +31,7 @@ at {counts} VPLs: {generated} generated (`tuner/scene_generator.py`), the others
 ## On scenes that it has not seen
 
 Each scene was left out, in {folds} groups in turn, from a prior trained like this one. The loss is that of a
-fit (relMSE and a share of plain squared error, through the surrogate); `fit` is the scene's own, made for its
+fit (relative, robust against single pixels, through the surrogate); `fit` is the scene's own, made for its
 fitted views at that VPL count. Medians over scenes, and the share of them where `auto` is better than the
 defaults, by that loss and by relMSE alone:
 

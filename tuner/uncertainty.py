@@ -109,6 +109,23 @@ def fit_with_intervals(
     )
 
 
+def open_intervals(
+    views: tuple[FitView, ...], tuned: ArtistParameters, names: frozenset[str], prior: ArtistParameters
+) -> dict[str, Interval]:
+    """Intervals at `tuned`, which stays as it is; a parameter that is left open, or at a bound of its range
+    that `prior` is not at, is not determined."""
+    known = intervals(views, tuned, names)
+    bounds = {name: _bound(name, tuned, prior) for name in known}
+    return {
+        name: replace(
+            interval,
+            determined=bounds[name] is None and _width(name, interval) <= OPEN_SHARE,
+            at_bound=bounds[name],
+        )
+        for name, interval in known.items()
+    }
+
+
 def intervals(
     views: tuple[FitView, ...], tuned: ArtistParameters, names: frozenset[str]
 ) -> dict[str, Interval]:

@@ -1,11 +1,17 @@
 """Draws candidates in validation views: the evidence that `tuner.guard` judges by."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float32
 
 from renderer.artist_parameters import ARTIST_PARAMETERS, ArtistParameters, placement
 from renderer.runtime import Runtime
 from renderer.views import View
 from tuner.captured_view import CapturedView
+from tuner.flicker import flicker, moved_by_a_texel
 from tuner.reference.reference_view import ReferenceView
 from tuner.search_space import SearchSpace
 from tuner.view_metrics import ViewMetrics, mean_metrics
@@ -47,6 +53,8 @@ def validation_metrics(
     views: Sequence[tuple[View, ReferenceView]],
     parameters: Mapping[str, ArtistParameters],
     rotations: Sequence[tuple[float, float]],
+    *,
+    motion: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[dict[str, list[ViewMetrics]], tuple[CapturedView, ...]]:
     """Metrics of every candidate in every view that light reaches, means over the rotations.
@@ -56,6 +64,7 @@ def validation_metrics(
         views: with their references.
         parameters: by name; those with one placement share VPLs and maps.
         rotations: of the point table.
+        motion: whether to measure flicker too, which draws everything twice.
         progress: called with the share done, in [0, 1].
 
     Returns:
@@ -76,11 +85,22 @@ def validation_metrics(
                     captured_views.append(captured)
                 if not captured.lit:
                     break
-                for name, image in zip(names, images, strict=True):
-                    drawn[name].append(captured.metrics(image))
+                moved: Sequence[Float32[np.ndarray, "height width 3"] | None] = [None] * len(images)
+                if motion:
+                    beside = moved_by_a_texel(view, frame.scene_length)
+                    _, moved = runtime.capture_variants(
+                        beside, [parameters[name] for name in names], rotation
+                    )
+                for name, image, after in zip(names, images, moved, strict=True):
+                    metrics = captured.metrics(image)
+                    if after is not None:
+                        metrics = replace(metrics, flicker=flicker(image, after, captured.valid))
+                    drawn[name].append(metrics)
         if captured_views[-1].lit:
-            for name, metrics in drawn.items():
-                measured[name].append(mean_metrics(metrics))
+            for name, of_rotations in drawn.items():
+                # A rotation without a value is not to vanish in a mean: it is what the guard has to see.
+                broken = [each for each in of_rotations if not math.isfinite(each.relmse)]
+                measured[name].append(broken[0] if broken else mean_metrics(of_rotations))
         if progress is not None:
             progress((index + 1) / len(views))
     return measured, tuple(captured_views)

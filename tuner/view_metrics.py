@@ -40,6 +40,8 @@ class ViewMetrics:
     flip: float
     """Mean HDR-FLIP (Andersson et al. 2021) of direct plus indirect radiance, in [0, 1]. Both images have the
     runtime's albedo, so that light is compared and texture filtering is not."""
+    flicker: float = math.nan
+    """What moving the lights by a texel changes (`tuner.flicker`); NaN where it was not measured."""
 
 
 def relmse(picture: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:

@@ -31,8 +31,7 @@ VARIANTS = ("default", "tuned", "ceiling")
 MAXIMUM_PIXELS = 256 * 192
 """Of a view: a larger one is kept as every second, third … pixel of every such row."""
 MAXIMUM_VIEWS = {"fitted": 16, "held_out": 8}
-"""The first of each split; with `MAXIMUM_PIXELS` this bounds the file by 60 MB. Two fitted views and one held
-out of 128×96 make about 0.8 MB."""
+"""The first of each split; with `MAXIMUM_PIXELS` this bounds the file by 60 MB."""
 # A damaged archive shows itself in any of these; TypeError is that of a lone array, which is no archive.
 _UNREADABLE = (
     OSError,

@@ -10,6 +10,7 @@ from renderer.artist_parameters import ArtistParameters, placement
 from renderer.runtime import Runtime
 
 START = ArtistParameters(vpl_count=64)
+DISCS = replace(START, density_relaxation=2, density_importance=0.5, falloff_footprint=1.0)
 OTHERS = (
     replace(START, intensity=2.0, falloff_footprint=1.5),
     replace(START, falloff_transmittance=0.4, visibility_bias=0.02, visibility_softness=0.2),
@@ -32,6 +33,15 @@ def test_images_are_those_of_single_draws(runtime, rotation):
         runtime.parameters = parameters
         assert np.array_equal(image, runtime.capture(view, rotation).indirect_irradiance)
     assert not np.array_equal(images[0], images[1])
+
+
+def test_discs_placed_by_importance_are_gathered_again_as_they_were(runtime):
+    view = room_view("spot", size=(24, 18))
+    wide = replace(DISCS, falloff_footprint=1.7, visibility_softness=0.1)
+    _, images = runtime.capture_variants(view, [DISCS, wide])
+    for parameters, image in zip((DISCS, wide), images, strict=True):
+        runtime.parameters = parameters
+        assert np.array_equal(image, runtime.capture(view).indirect_irradiance)
 
 
 def test_parameters_that_place_vpls_differently_are_refused(runtime):

@@ -91,8 +91,8 @@ def test_parameters_that_the_views_leave_open_are_named():
         "falloff_footprint": replace(interval, determined=False),
         "falloff_transmittance": replace(interval, low=0.0, high=0.1),
     }
-    found = undetermined(known, ArtistParameters(), ArtistParameters())
+    found = undetermined(known, ArtistParameters())
     assert found == (
-        "intensity is not determined by these views: it ran to the bound 20 of its range; 1 is kept",
-        "falloff_footprint is not determined by these views: its interval is 0.05 to 20; 0.5 is kept",
+        "intensity is not determined by these views: it ran to the bound 20 of its range; 1 is written",
+        "falloff_footprint is not determined by these views: its interval is 0.05 to 20; 0.5 is written",
     )

@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 
 from renderer.artist_parameters import ARTIST_PARAMETERS
-from renderer.tuned_config import read_config
+from renderer.tuned_config import TunedConfig, read_config, write_config
 from renderer.views import read_views
 from tuner.__main__ import run
 from tuner.view_metrics import relmse
 from tuner.view_pictures import read_view_pictures
 
 SCENE = Path(__file__).resolve().parent.parent.parent / "configs" / "scenes" / "cornell-box.glb"
-STAGES = ("load", "reference", "capture", "fit", "evaluate", "total")
+STAGES = ("load", "reference", "capture", "fit", "validate", "evaluate", "total")
 
 pytestmark = pytest.mark.slow  # a fit with a cold reference cache
 
@@ -38,7 +38,9 @@ def document(fitted, capfd):
 
 
 def test_stdout_and_metrics_are_as_documented(fitted, document):
-    assert document["status"] == "ok"
+    assert document["status"] == "improved"
+    assert document["sentence"].startswith("better than the start on 3 validation views: relMSE ×0.")
+    assert document["provenance"]["status"] == "improved"
     assert document["scene"] == str(SCENE)
     assert document["views"] == str(fitted / "out" / "views.json")
     assert set(document["parameters"]) == {spec.name for spec in ARTIST_PARAMETERS}
@@ -75,13 +77,34 @@ def test_pictures_are_those_that_were_measured(fitted, document):
 def test_the_tuned_config_holds_the_parameters_and_is_no_worse(fitted, document):
     assert read_config(fitted / "out" / "tuned.json").parameters.as_dict() == document["parameters"]
     metrics = document["metrics"]["fitted"]
-    # The loss is not relMSE itself, but on the one view that it was fitted to it must not lead away from it.
-    assert metrics["tuned"]["relmse"] <= 1.05 * metrics["default"]["relmse"]
+    for figure in ("relmse", "trimmed_relmse", "median_error", "flip"):
+        assert metrics["tuned"][figure] <= 1.02 * metrics["default"][figure], figure
+
+
+def test_the_choice_is_told_with_every_candidate(fitted, document):
+    validation = document["validation"]
+    names = [candidate["name"] for candidate in validation["candidates"]]
+    assert names[0] == "placement"
+    assert "auto" in names
+    assert validation["chosen"] in names
+    (chosen,) = [each for each in validation["candidates"] if each["name"] == validation["chosen"]]
+    assert chosen["accepted"]
+    assert chosen["parameters"] == document["parameters"]
+    assert min(document["placements"].values()) < 1.0
+
+
+def test_an_export_of_what_was_kept_says_so(fitted, document, capfd, tmp_path):
+    config = read_config(fitted / "out" / "tuned.json")
+    kept = TunedConfig(config.parameters, {**config.provenance, "status": "kept", "fit": "no gain"})
+    write_config(tmp_path / "kept.json", kept)
+    for source, told in ((fitted / "out" / "tuned.json", False), (tmp_path / "kept.json", True)):
+        assert run(["export", str(source), "--to", "json", "-o", str(tmp_path / "out.json")]) == 0
+        assert ("from a fit that ended kept: no gain" in capfd.readouterr().err) == told
 
 
 def test_views_have_both_splits_and_can_be_drawn(fitted, document, capfd):
     views = read_views(Path(document["views"]))
-    assert {view.split for view in views} == {"fitted", "held_out"}
+    assert {view.split for view in views} == {"fitted", "validation", "held_out"}
     tuned = str(fitted / "out" / "tuned.json")
     arguments = [
         "--views",
@@ -123,5 +146,4 @@ def test_without_visibility_transmittance_is_left_alone(fitted, capfd):
     document = json.loads(capfd.readouterr().out)
     assert document["parameters"]["falloff_transmittance"] == 0.0
     assert "falloff_transmittance" not in document["uncertainty"]
-    metrics = document["metrics"]["fitted"]
-    assert metrics["tuned"]["relmse"] < metrics["default"]["relmse"]
+    assert document["status"] in ("improved", "kept")

@@ -56,7 +56,7 @@ def steady_clock(monkeypatch, tmp_path):
 @pytest.fixture(scope="module")
 def prepared(gl_context) -> PreparedScene:
     runtime = Runtime(colored_room(), START, rsm_resolution=128, context=gl_context)
-    return PreparedScene(colored_room(), runtime, (converged_view(runtime, "spot"),), ())
+    return PreparedScene(colored_room(), runtime, (converged_view(runtime, "spot"),), (), ())
 
 
 @pytest.mark.parametrize("budget", [12.0, pytest.param(30.0, marks=pytest.mark.slow)])

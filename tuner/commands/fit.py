@@ -60,6 +60,10 @@ def fit(
         str | None,
         typer.Option(metavar="WxH", help="Of the frames that are timed. [--size]", show_default=False),
     ] = None,
+    motion: Annotated[
+        bool,
+        typer.Option("--motion", help="Accept only what flickers no more than the start as lights move."),
+    ] = False,
     bounces: BouncesOption = "1",
     split_error: SplitErrorOption = False,
     *,
@@ -79,6 +83,7 @@ def fit(
         start=start,
         density=vpl_count is not None and vpl_count <= FEW_VPLS,
         budget=budget_from_flags(vpl_count, budget_ms, pareto, frame_size),
+        motion=motion,
         views=views,
         seed=seed,
         bounces=bounces,

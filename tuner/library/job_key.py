@@ -22,7 +22,7 @@ from renderer.tuned_config import parse_config
 from tuner.library.job import JobOptions
 from tuner.library.referred_files import referred_files
 
-KEY_VERSION = 1
+KEY_VERSION = 2
 """Raise when a record of the same inputs would say something else: old records are then passed over."""
 SETTLED_SECONDS = 2.0
 """A file changed so shortly before it was hashed could change again within one tick of its clock."""

@@ -23,7 +23,7 @@ VIEWS = 4
 EVEN_SHARE = 10.0
 """Weight of the plain squared error in the loss before."""
 SHARES = {"0.1": 0.001, "1": 0.01}
-"""Of a view's pixels, by their per cent."""
+"""Shares of a view's pixels, by their per cent."""
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:

@@ -28,7 +28,8 @@ SEED = 20261129
 """Of the generator: chosen nothing on, and drawn for this measurement alone."""
 GENERATED = 32
 HELD_OUT = 4
-"""Views: with two, as a fit has by default, the ratio of a scene is mostly the luck of the views."""
+"""Held-out views. With two, as a fit has by default, a scene's ratio depends mostly on which views they
+are."""
 FEW = 32
 """VPLs of the second fit."""
 FIGURES = ("relmse", "trimmed_relmse", "flip", "median_error")
@@ -36,7 +37,7 @@ CLOSE, FAR = 1.02, 1.10
 """Ratios tuned ÷ start: what counts as no loss, and what no scene may exceed."""
 LEAST_SHARE, MOST_KEPT = 0.95, 0.5
 MEDIAN_LIMITS = {"default": 0.90, "few": 0.5}
-"""Of the trimmed relMSE's ratio."""
+"""Limits of the trimmed relMSE's median ratio."""
 WORKERS = 2
 SOURCES = ("renderer", "tuner", "shaders", "configs")
 

@@ -255,11 +255,11 @@ class Runtime:
         parameters: Sequence[ArtistParameters],
         table_rotation: tuple[float, float] = (0.0, 0.0),
     ) -> tuple[CapturedFrame, list[Float32[np.ndarray, "height width 3"]]]:
-        """As `capture`, without visibility maps, and the indirect irradiance [W/m²] with each of
-        `parameters`.
+        """Capture a view, and gather its indirect irradiance [W/m²] with each of `parameters`.
 
-        The parameters must place VPLs alike: these and their maps are drawn once. The first of them are
-        those that the frame is captured with. Takes the place of the runtime's parameters, and of its prior.
+        The parameters must place VPLs alike: VPLs and their visibility maps are drawn once. The captured
+        frame is that of the first parameters, without maps. The last parameters replace the runtime's own,
+        and its prior.
 
         Raises:
             ValueError: there are no parameters, or they place VPLs differently.

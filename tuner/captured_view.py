@@ -15,10 +15,10 @@ from tuner.reference.reference_view import ReferenceView
 from tuner.view_metrics import ViewMetrics, view_metrics
 
 PIXELS_STEP = 512
-"""Of the pixels that a fit looks at: a sixth of a 64×48 view, of which a fit misses half as much on
-average."""
+"""Pixel counts are rounded down to a multiple of this, so that views share compiled functions: 256 pixels
+are left out on average."""
 SAME_SURFACE = 0.02
-"""Of a pixel's depth: farther apart, runtime and reference see two surfaces. A choice: rounding is a
+"""Share of a pixel's depth: farther apart, runtime and reference see two surfaces. A choice: rounding is a
 thousandth of it, and the gap behind a silhouette mostly more."""
 
 

@@ -1,5 +1,4 @@
-"""Side by side: the reference, default, tuned and ceiling, as whole images, as indirect light, and its
-error."""
+"""Reference, default, tuned and ceiling side by side: whole images, indirect light, signed error."""
 
 import math
 from collections.abc import Mapping

@@ -7,8 +7,9 @@ Every share is the relMSE that goes away with its cause, over the fitted views:
   infinitely many rotations would leave E = E_R − (E₁ − E_R)/(R − 1): the variance of a mean falls as 1/R.
 - `clamping`: that E, less the error with eight times the VPLs (of clustered discs, at most 4,096), whose
   footprints, and with them the reach of α, are √8 times smaller. (α = 0 in their place would measure the
-bright dots that α is there to prevent.) - `visibility`: the tuned picture, less the ceiling's, which is the
-same VPLs with rays for visibility. - `filter`: the runtime's picture, less a plain gather's of the same VPLs.
+  bright dots that α is there to prevent.)
+- `visibility`: the tuned picture, less the ceiling's, which is the same VPLs with rays for visibility.
+- `filter`: the runtime's picture, less a plain gather's of the same VPLs.
 - `missing_bounces`: against all bounces, less against one, where all bounces were asked for.
 - `remainder`: what these leave. Causes act on each other, so it may be negative, as may any share whose cause
   makes up for another's.

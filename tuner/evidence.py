@@ -13,11 +13,10 @@ from tuner.uncertainty import Interval
 LEAST_LIT_VIEWS = 2
 """Validation views that light must reach: a spread needs two."""
 LEAST_PIXELS = 256
-"""Lit pixels that all validation views must have together. A choice: a twelfth of one view of the default
-size."""
+"""Lit pixels that the validation views must have together. A choice: a twelfth of one default view."""
 CLOSE = 0.03
-"""Share of L: a camera whose median depth is less stands against a surface, or sees next to nothing of what
-is lit."""
+"""Share of L. A camera with a smaller median depth stands against a surface, or sees little of what is
+lit."""
 MOST_DISAGREEMENT = 0.1
 """Share of the pixels at which runtime and reference may see two surfaces. A choice: edges make up some 2
 %, a camera inside a surface that the near plane cuts away most of an image."""

@@ -35,8 +35,8 @@ from tuner.losses.robust_error import RobustError
 from tuner.search_space import held_for
 
 ROTATIONS = 4
-"""Of each view, so that four views have sixteen placements. The first is none at all: what the runtime
-draws with."""
+"""Rotations of each view, so that four views have sixteen placements. The first is none at all: what the
+runtime draws with."""
 HELD_OUT_ROTATIONS = 8
 FEW_VPLS = 256
 """Up to this many, the fit sees several rotations and the density is fitted; beyond, one placement is as good

@@ -1,5 +1,4 @@
-"""Fits intensity and falloff to views whose weights are given: one least-squares problem of a few hundred
-rows.
+"""Fits intensity and falloff to views with given weights, as one small least-squares problem.
 
 The image is linear in the intensity k, so at every point of the other parameters the best k has a closed
 form, and the fit moves over the others alone (variable projection, Golub and Pereyra 1973).

@@ -1,5 +1,4 @@
-"""Looks for parameters better than a fit's start, on its fitted views; whether they are, `tuner.guard`
-decides."""
+"""Looks for better parameters on the fitted views; `tuner.guard` decides whether they are."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace

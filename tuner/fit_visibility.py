@@ -28,9 +28,9 @@ from tuner.wide_vectors import wide_jit
 
 LEAST_GAIN = 0.02
 """Share of the loss that a move must gain. A choice: without it, bias and softness wandered over a flat
-loss, and raised the held-out relMSE of one scene of development to 1.8 times."""
+loss, and raised the held-out relMSE of one development scene to 1.8 times."""
 AT_BOUND = 1e-3
-"""Of the cube's side: nearer to its wall, a parameter counts as being at its bound."""
+"""Share of the cube's side: nearer to its wall, a parameter is at its bound."""
 STARTS = 9
 """Along each axis of the grid from whose best point a descent begins."""
 NODES = 96

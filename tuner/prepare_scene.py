@@ -20,9 +20,8 @@ from tuner.reference import ReferenceView, reference_views
 Progress = Callable[[str, float], None]
 
 VIEW_SIZE = (64, 48)
-"""Of the views that are fitted and measured. More and smaller views tell more than few large ones:
-neighbouring pixels err together, and what a view costs is mostly its VPLs' visibility maps, whatever its
-size."""
+"""Pixels of the fitted and measured views. More and smaller views tell more than few large ones: neighbouring
+pixels err together, and a view's time goes into its VPLs' visibility maps, whatever its size."""
 LEAST_VALIDATION = 3
 """Validation views at least: the spread between two says next to nothing."""
 NOISE_TARGET = 5e-4

@@ -39,7 +39,7 @@ OPEN_SHARE = 1.0 / 3.0
 PRIOR_COST = 0.01
 """Of the sum of squares, which a parameter may cost that goes back to the prior."""
 AT_BOUND = 1e-3
-"""Of the cube's side: nearer to its wall, a parameter is at its bound."""
+"""Share of the cube's side: nearer to its wall, a parameter is at its bound."""
 REACH = np.geomspace(1e-3, 1.0, 16)
 """Of the cube's side: how far from the optimum a profile is asked, on either side."""
 TRADING = 0.8

@@ -39,6 +39,9 @@ def candidates(
         auto: what the learnt prior sets; None where it does not apply.
     """
     named = {"placement": base, "halfway": between(base, tuned, 0.5), "tuned": tuned}
+    if base == tuned:
+        # There is nothing between them but rounding.
+        named = {"placement": base}
     if auto is not None:
         named["auto"] = auto
     chosen: dict[str, ArtistParameters] = {}

@@ -7,6 +7,7 @@ import math
 from rich.console import Console
 
 from renderer.artist_parameters import ArtistParameters
+from tuner.commands import progress_display
 from tuner.commands.metrics_table import metrics_table, parameters_table
 from tuner.commands.progress_display import shown_progress
 from tuner.commands.report import print_json
@@ -75,6 +76,16 @@ def test_without_a_terminal_each_stage_is_one_line_on_stderr(capsys):
     shown = capsys.readouterr()
     assert shown.out == ""
     assert shown.err == "vpltune: reference\nvpltune: fit\n"
+
+
+def test_a_long_stage_tells_percent_and_time_left(capsys, monkeypatch):
+    """A quarter done after 30 s: 90 s are left; nothing more within the next ten."""
+    clock = iter((0.0, 30.0, 35.0, 39.9))
+    monkeypatch.setattr(progress_display.time, "monotonic", lambda: next(clock))
+    with shown_progress() as progress:
+        for fraction in (0.0, 0.25, 0.3, 0.4):
+            progress("reference", fraction)
+    assert capsys.readouterr().err == "vpltune: reference\nvpltune: reference 25%, 90 s left\n"
 
 
 def test_on_a_terminal_stages_are_bars(capsys, monkeypatch):

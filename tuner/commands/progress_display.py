@@ -71,18 +71,18 @@ LINE_SECONDS = 10.0
 def _line_per_stage() -> Progress:
     """A line when a stage begins, and while it goes on one every `LINE_SECONDS` with what is done and
     left."""
-    stage_begun = ("", 0.0)
+    begun: dict[str, float] = {}
     last_line = 0.0
 
     def show(stage: str, fraction: float) -> None:
-        nonlocal stage_begun, last_line
+        nonlocal last_line
         now = time.monotonic()
-        if stage != stage_begun[0]:
-            stage_begun, last_line = (stage, now), now
+        if stage not in begun:
+            begun[stage], last_line = now, now
             print(f"vpltune: {stage}", file=sys.stderr, flush=True)
         elif now - last_line >= LINE_SECONDS and 0.0 < fraction < 1.0:
             last_line = now
-            left = (now - stage_begun[1]) * (1.0 - fraction) / fraction
+            left = (now - begun[stage]) * (1.0 - fraction) / fraction
             print(f"vpltune: {stage} {fraction:.0%}, {left:.0f} s left", file=sys.stderr, flush=True)
 
     return show

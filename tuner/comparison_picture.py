@@ -23,6 +23,7 @@ _CAPTION = 22
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 Irradiance = Float32[np.ndarray, "height width 3"]
+Image8 = UInt8[np.ndarray, "height width 3"]
 Pixels = UInt8[np.ndarray, "rows columns 3"]
 
 
@@ -88,7 +89,7 @@ def _exposure(radiance: Irradiance, view: CapturedView) -> float:
     return EXPOSURE_KEY / level if level > 0.0 else 1.0
 
 
-def _panel(picture: Pixels, caption: str, size: tuple[int, int]) -> Pixels:
+def _panel(picture: Image8, caption: str, size: tuple[int, int]) -> Pixels:
     factor = max(-(-size[0] // picture.shape[1]), -(-size[1] // picture.shape[0]))
     picture = picture.repeat(factor, axis=0).repeat(factor, axis=1)
     height, width, _ = picture.shape

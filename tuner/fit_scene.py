@@ -221,13 +221,9 @@ def _judged(
     else:
         assert chosen is not None, "nothing is in doubt, so the candidates were judged"
         status, sentence, parameters = "kept", chosen.sentence, baseline
-    # The intervals are those of the tuned parameters: of others they say where the optimum lies, and no more.
+    # An interval says where the fitted views have their optimum; validation may have chosen a value beside it.
     known = {
-        name: replace(
-            interval,
-            value=float(getattr(parameters, name)),
-            determined=interval.determined and parameters == found.tuned,
-        )
+        name: replace(interval, value=float(getattr(parameters, name)))
         for name, interval in found.known.items()
     }
     notes = undetermined(found.known, parameters)

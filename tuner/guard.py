@@ -38,6 +38,12 @@ ENERGY_TOLERANCE = 0.01
 UNSEEN = {"relmse": 1e-5, "trimmed_relmse": 1e-5, "median_error": 1e-3, "flip": 1e-3, "flicker": 1e-3}
 """Added to both sides of a ratio, so that errors too small to see do not decide. A choice: 0.1 % of error
 in the median pixel, 0.3 % root mean square in relMSE, and a FLIP of 0.001."""
+CHOSEN = {
+    "placement": "; chosen: the placement, with the falloff that its fit began with",
+    "halfway": "; chosen: halfway to the tuned parameters",
+    "auto": "; chosen: what `auto` sets",
+}
+"""What the sentence of an accepted fit says where it is not the tuned parameters."""
 PREFERRED = 0.99
 """Score from which on a candidate takes the place of an earlier, simpler one."""
 
@@ -168,7 +174,7 @@ def judgement(
 def _sentence(chosen: Judgement | None, judged: Sequence[Judgement], views: int) -> str:
     if chosen is not None:
         figures = ", ".join(f"{WORDS[name]} ×{chosen.ratios[name]:.2f}" for name in MEASURES)
-        return f"better than the start on {views} validation views: {figures}"
+        return f"better than the start on {views} validation views: {figures}{CHOSEN.get(chosen.name, '')}"
     if not judged:
         return "nothing differs from the start; the start is kept"
     best = min(judged, key=lambda each: each.score)

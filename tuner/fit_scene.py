@@ -221,8 +221,8 @@ def _judged(
     else:
         assert chosen is not None, "nothing is in doubt, so the candidates were judged"
         status, sentence, parameters = "kept", chosen.sentence, baseline
-    # An interval says where the fitted views have their optimum; validation may have chosen a value beside
-    it. known = {
+    # An interval says where the fitted views have their optimum; validation may choose a value beside it.
+    known = {
         name: replace(interval, value=float(getattr(parameters, name)))
         for name, interval in found.known.items()
     }

@@ -5,7 +5,7 @@ of its error no choice of the falloff parameters can take away.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import jax.numpy as jnp
@@ -63,7 +63,7 @@ class Evaluation:
                 "name": evaluated.view.view.name,
                 "split": evaluated.view.view.split,
                 "parameters": evaluated.tuned.as_dict(),
-                **{variant: asdict(evaluated.metrics[variant]) for variant in VARIANTS},
+                **{variant: evaluated.metrics[variant].as_dict() for variant in VARIANTS},
                 "noise_floor": evaluated.noise_floor,
                 "samples": evaluated.view.reference.samples,
             }
@@ -98,7 +98,7 @@ class Evaluation:
         if not views:
             return {}
         means = {
-            variant: asdict(mean_metrics([evaluated.metrics[variant] for evaluated in views]))
+            variant: mean_metrics([evaluated.metrics[variant] for evaluated in views]).as_dict()
             for variant in VARIANTS
         }
         return {**means, "noise_floor": float(np.mean([evaluated.noise_floor for evaluated in views]))}

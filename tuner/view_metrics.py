@@ -43,6 +43,13 @@ class ViewMetrics:
     flicker: float = math.nan
     """What moving the lights by a texel changes (`tuner.flicker`); NaN where it was not measured."""
 
+    def as_dict(self) -> dict[str, float]:
+        """The figures by name; flicker only where it was measured."""
+        figures = {each.name: getattr(self, each.name) for each in fields(self)}
+        if math.isnan(self.flicker):
+            del figures["flicker"]
+        return figures
+
 
 def relmse(picture: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:
     """Relative mean squared error; NaN against a black reference."""

@@ -25,7 +25,7 @@ from renderer.strict_json import strict_json
 from tuner.guard import UNSEEN
 
 SEED = 20261129
-"""Of the generator: chosen nothing on, and drawn for this measurement alone."""
+"""Seed of the generator. Nothing was chosen on its scenes; they are made for this measurement alone."""
 GENERATED = 32
 HELD_OUT = 4
 """Held-out views. With two, as a fit has by default, a scene's ratio depends mostly on which views they

@@ -34,7 +34,7 @@ LEAST_GAIN = 0.99
 """Ratio to the start below which a measure counts as better. A choice: less than 1 % is not worth a
 change."""
 ENERGY_TOLERANCE = 0.01
-"""Of |1 − energy ratio|, the mean over views."""
+"""What the mean of |1 − energy ratio| over the views may grow by."""
 UNSEEN = {"relmse": 1e-5, "trimmed_relmse": 1e-5, "median_error": 1e-3, "flip": 1e-3, "flicker": 1e-3}
 """Added to both sides of a ratio, so that errors too small to see do not decide. A choice: 0.1 % of error
 in the median pixel, 0.3 % root mean square in relMSE, and a FLIP of 0.001."""

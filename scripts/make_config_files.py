@@ -3,10 +3,10 @@
 import json
 from pathlib import Path
 
-from renderer.atomic_file import write_text_whole
-from renderer.tuned_config import TunedConfig, config_schema, config_text
+from vpltune.renderer.config.tuned_config import TunedConfig, config_schema, config_text
+from vpltune.renderer.files.atomic_file import write_text_whole
 
-CONFIGS = Path(__file__).resolve().parent.parent / "configs"
+CONFIGS = Path(__file__).resolve().parents[1] / "configs"
 
 if __name__ == "__main__":
     write_text_whole(CONFIGS / "default.json", config_text(TunedConfig()))

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-FOLDER = Path(__file__).resolve().parent.parent / "out" / "quality"
+FOLDER = Path(__file__).resolve().parents[1] / "out" / "quality"
 VARIANTS = ("default", "tuned", "ceiling")
 
 

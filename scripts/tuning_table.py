@@ -5,7 +5,7 @@ python scripts/tuning_table.py
 
 import json
 
-from benchmarks.tuning import FOLDER, best_found, rows_of, spent_in
+from benchmarks.tuning.tuning import FOLDER, best_found, rows_of, spent_in
 
 
 def main() -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 # Before any test module imports them: the hook works at import.
-jaxtyping.install_import_hook(["renderer", "tuner"], "beartype.beartype")
+jaxtyping.install_import_hook(["vpltune"], "beartype.beartype")
 
-REPOSITORY = Path(__file__).resolve().parent.parent
+REPOSITORY = Path(__file__).resolve().parents[1]
 
 
 @pytest.fixture(autouse=True)
@@ -45,7 +45,7 @@ def _outside_folder(variable: str, name: str) -> Path:
 @pytest.fixture(scope="session")
 def gl_context():
     """One OpenGL context for the whole run: making one for each test takes longer than the tests."""
-    from renderer.gpu_context import create_context
+    from vpltune.renderer.gpu.gpu_context import create_context
 
     return create_context()
 

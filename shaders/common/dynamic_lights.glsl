@@ -1,4 +1,4 @@
-// Small direct lights without shadows. Twin: renderer/dynamic_lights.py.
+// Small direct lights without shadows. Twin: renderer/scene/dynamic_lights.py.
 
 struct DynamicLight {
     vec4 position_range;        // world position; range [world units]

@@ -1,5 +1,5 @@
 // Unit vectors of the upper hemisphere (z >= 0) on the square [-1, 1]², without a crease (Cigolle et al. 2014,
-// "hemi-oct"). Twin: tuner/vpl_visibility.py.
+// "hemi-oct"). Twin: tuner/surrogate/vpl_visibility.py.
 
 vec2 hemi_octahedral_encode(vec3 direction) {
     vec2 p = direction.xy / (abs(direction.x) + abs(direction.y) + direction.z);

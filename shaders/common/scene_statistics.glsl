@@ -1,4 +1,4 @@
-// What is measured of a lit scene each frame; names and meanings in renderer/scene_statistics.py.
+// What is measured of a lit scene each frame; names and meanings in renderer/config/scene_statistics.py.
 
 struct ReceiverSums {
     float pairs;

@@ -1,4 +1,4 @@
-// A cell of light as a disc of even radiosity, cut off at the receiver's horizon. Twin: tuner/vpl_disc.py.
+// A cell of light as a disc of even radiosity, cut off at the receiver's horizon. Twin: tuner/surrogate/vpl_disc.py.
 //
 // Of a disc around c with normal m, radius l and flux Φ, a receiver at x with normal n gets, with the height
 // h = m·(x - c) > 0, ρ = (x - c) - h m, S = |x - c|² + l² and Q = √(S² - 4ρ²l²),

@@ -1,5 +1,5 @@
 // The sampling weight of an RSM texel: flux^γ, times what the camera would miss without the texel's light.
-// Needs common/artist_parameters.glsl and common/rsm.glsl. Made by shaders/vpl_importance_factor.comp; see there and vpl_importance.comp.
+// Needs common/artist_parameters.glsl and common/rsm.glsl. Made by shaders/vpl_importance/vpl_importance_factor.comp; see there and vpl_importance.comp.
 
 layout(std430, binding = VPL_IMPORTANCE_BINDING) buffer VplImportance {
     float vpl_importance[];  // [faces, IMPORTANCE_CELLS, IMPORTANCE_CELLS], a factor of the weight

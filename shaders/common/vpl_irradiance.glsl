@@ -1,4 +1,4 @@
-// Irradiance from one VPL. Twin: tuner/vpl_gather.py `vpl_irradiance`.
+// Irradiance from one VPL. Twin: tuner/surrogate/vpl_gather.py `vpl_irradiance`.
 // Keller 1997 (instant radiosity), with the point spread over its footprint: 1/d² becomes 1/(d² + (αl)²),
 // which for α = 1 is the exact form factor of a coaxial disc.
 

@@ -1,4 +1,4 @@
-// What a VPL sees, from its small map of surfaces. Twin: tuner/vpl_visibility.py.
+// What a VPL sees, from its small map of surfaces. Twin: tuner/surrogate/vpl_visibility.py.
 #include "common/hemi_octahedral.glsl"
 #include "common/octahedral.glsl"
 

@@ -1,4 +1,4 @@
-// Direct irradiance of all lights, shadowed by their RSMs: the loop of shaders/direct_light.comp.
+// Direct irradiance of all lights, shadowed by their RSMs: the loop of shaders/direct_light/direct_light.comp.
 #include "common/gbuffer.glsl"
 #include "common/rsm.glsl"
 #include "common/shadow.glsl"

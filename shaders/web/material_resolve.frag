@@ -1,4 +1,4 @@
-// Radiance towards the eye, as shaders/material_resolve.comp has it.
+// Radiance towards the eye, as shaders/display/material_resolve.comp has it.
 uniform sampler2D gbuffer_albedo;
 uniform sampler2D direct_irradiance;
 uniform sampler2D indirect_irradiance;

@@ -1,4 +1,4 @@
-// L from the moments' sums, as shaders/vpl_marginal_density.comp has it.
+// L from the moments' sums, as shaders/virtual_point_lights/vpl_marginal_density.comp has it.
 uniform sampler2D flux_position;
 uniform sampler2D flux_square;
 

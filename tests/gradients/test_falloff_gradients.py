@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
 
-from benchmarks.fit import corner
-from renderer.artist_parameters import ArtistParameters
-from renderer.runtime import Runtime
-from renderer.tuned_config import TunedConfig
-from tuner.losses.relative_squared_error import target_of, weighted_squared_error
-from tuner.search_space import SearchSpace
-from tuner.tabulated_gather import gather_tabulated, tabulate_gather
-from tuner.virtual_point_lights import gather_inputs
-from tuner.vpl_gather import FalloffParameters, gather, gather_pairwise
+from benchmarks.speed.fit import corner
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.tuner.fitting.search_space import SearchSpace
+from vpltune.tuner.metrics.relative_squared_error import target_of, weighted_squared_error
+from vpltune.tuner.surrogate.tabulated_gather import gather_tabulated, tabulate_gather
+from vpltune.tuner.surrogate.virtual_point_lights import gather_inputs
+from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, gather, gather_pairwise
 
 CELLS = ArtistParameters(vpl_count=64, density_relaxation=4, falloff_footprint=0.9, falloff_transmittance=0.6)
 START = ArtistParameters(intensity=1.4, falloff_footprint=0.7, falloff_transmittance=0.6, vpl_count=256)
@@ -116,7 +116,7 @@ def test_the_gather_is_linear_in_visibility():
 
 def test_gradient_is_finite_where_receiver_and_vpl_coincide():
     """d = 0, α at its bound, κ at zero: the hard points of every quotient and root."""
-    from tuner.virtual_point_lights import Receivers, VirtualPointLights
+    from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
 
     receivers = Receivers(jnp.zeros((4, 3)), jnp.tile(jnp.array([0.0, 1.0, 0.0]), (4, 1)))
     vpls = VirtualPointLights(

@@ -9,17 +9,23 @@ import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
 from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
-from benchmarks.fit import corner
-from renderer.artist_parameters import ArtistParameters
-from renderer.runtime import Runtime
-from renderer.scene import Camera, Light, look_at
-from renderer.scene_file import read_scene
-from renderer.tuned_config import TunedConfig
-from renderer.view_placement import resolve_camera_and_lights
-from renderer.views import View
-from tuner.tabulated_gather import gather_tabulated, tabulate_gather
-from tuner.virtual_point_lights import gather_inputs
-from tuner.vpl_gather import PAIRS_AT_ONCE, FalloffParameters, gather, gather_pairwise, receivers_at_once
+from benchmarks.speed.fit import corner
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.placement import resolve_camera_and_lights
+from vpltune.renderer.scene.scene import Camera, Light, look_at
+from vpltune.renderer.scene.views import View
+from vpltune.tuner.surrogate.tabulated_gather import gather_tabulated, tabulate_gather
+from vpltune.tuner.surrogate.virtual_point_lights import gather_inputs
+from vpltune.tuner.surrogate.vpl_gather import (
+    PAIRS_AT_ONCE,
+    FalloffParameters,
+    gather,
+    gather_pairwise,
+    receivers_at_once,
+)
 
 PARAMETERS = (
     ArtistParameters(),

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
 
-from renderer.artist_parameters import ArtistParameters
-from renderer.runtime import Runtime
-from renderer.scene import Camera, look_at, scaled
-from renderer.scene_statistics import STATISTIC_NAMES
-from renderer.tuned_config import TunedConfig
-from renderer.views import View, scaled_view
-from tuner.scene_statistics import scene_statistics
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.scene_statistics import STATISTIC_NAMES
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.scene.scene import Camera, look_at, scaled
+from vpltune.renderer.scene.views import View, scaled_view
+from vpltune.tuner.surrogate.scene_statistics import scene_statistics
 
 
 def runtime_of(context, visibility="maps", vpl_count=64, factor=1.0) -> Runtime:

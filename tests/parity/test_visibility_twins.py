@@ -7,18 +7,22 @@ import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
 from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
-from renderer.artist_parameters import ArtistParameters
-from renderer.capture import CapturedFrame
-from renderer.runtime import Runtime
-from renderer.runtime_options import RuntimeOptions
-from renderer.scene import Camera, Light, look_at, scaled
-from renderer.scene_file import read_scene
-from renderer.tuned_config import TunedConfig
-from renderer.view_placement import resolve_camera_and_lights
-from renderer.views import View, scaled_view
-from tuner.virtual_point_lights import gather_inputs
-from tuner.vpl_gather import FalloffParameters, gather
-from tuner.vpl_visibility import hemi_octahedral_decode, hemi_octahedral_encode, map_visibility
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.capture import CapturedFrame
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.frame.runtime_options import RuntimeOptions
+from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.placement import resolve_camera_and_lights
+from vpltune.renderer.scene.scene import Camera, Light, look_at, scaled
+from vpltune.renderer.scene.views import View, scaled_view
+from vpltune.tuner.surrogate.virtual_point_lights import gather_inputs
+from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, gather
+from vpltune.tuner.surrogate.vpl_visibility import (
+    hemi_octahedral_decode,
+    hemi_octahedral_encode,
+    map_visibility,
+)
 
 PARAMETERS = ArtistParameters(vpl_count=256)
 MAPS = TunedConfig(PARAMETERS, visibility="maps")

@@ -5,24 +5,24 @@ import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
 from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
-from renderer.artist_parameters import ArtistParameters
-from renderer.camera_uniforms import camera_uniforms
-from renderer.capture import octahedral_decode, read_picture
-from renderer.passes.interleaved_filter import InterleavedFilterPass
-from renderer.render_targets import (
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.capture import octahedral_decode, read_picture
+from vpltune.renderer.frame.passes.interleaved_filter import InterleavedFilterPass
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.frame.runtime_options import RuntimeOptions
+from vpltune.renderer.gpu.camera_uniforms import camera_uniforms
+from vpltune.renderer.gpu.render_targets import (
     create_direction_target,
     create_gbuffer,
     create_irradiance_target,
     create_pixel_list,
 )
-from renderer.runtime import Runtime
-from renderer.runtime_options import RuntimeOptions
-from renderer.scene import Camera, Light, look_at
-from renderer.scene_file import read_scene
-from renderer.tuned_config import TunedConfig
-from renderer.view_placement import resolve_camera_and_lights
-from renderer.views import View
-from tuner.view_metrics import energy_ratio, relmse
+from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.placement import resolve_camera_and_lights
+from vpltune.renderer.scene.scene import Camera, Light, look_at
+from vpltune.renderer.scene.views import View
+from vpltune.tuner.metrics.view_metrics import energy_ratio, relmse
 
 UNLIT = {"bevy-irradiancevolumeexample"}
 """From its own camera, the VPLs light nothing that is seen."""

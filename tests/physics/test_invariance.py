@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
 
-from renderer.artist_parameters import ArtistParameters
-from renderer.runtime import Runtime
-from renderer.scene import Camera, look_at, scaled
-from renderer.tuned_config import TunedConfig
-from renderer.views import View, scaled_view
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.scene.scene import Camera, look_at, scaled
+from vpltune.renderer.scene.views import View, scaled_view
 
 ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.15, 0.45))
 PARAMETERS = ArtistParameters(intensity=1.3, falloff_footprint=0.8, falloff_transmittance=0.3)
@@ -83,7 +83,7 @@ def test_no_absolute_length_in_a_shader():
         "1e-8",  # a share of a direction
     }
     number = re.compile(r"(?<![\w.])(?:\d+\.\d*|\.\d+|\d+)e-\d+")
-    for path in _shader_files(resources.files("shaders")):
+    for path in _shader_files(resources.files("vpltune.shaders")):
         code = re.sub(r"//.*", "", path.read_text(encoding="utf-8"))
         for found in number.findall(code):
             assert found in allowed, f"{path.name}: {found}"

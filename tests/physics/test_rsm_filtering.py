@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
 
-from renderer.artist_parameters import ArtistParameters
-from renderer.runtime import Runtime
-from renderer.runtime_options import RuntimeOptions
-from renderer.scene import Camera, Light, Material, Texture, look_at
-from renderer.tuned_config import TunedConfig
-from renderer.views import View
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.frame.runtime_options import RuntimeOptions
+from vpltune.renderer.scene.scene import Camera, Light, Material, Texture, look_at
+from vpltune.renderer.scene.views import View
 
 
 def runtime_with(scene, gl_context, filtering, resolution=256, **parameters) -> Runtime:

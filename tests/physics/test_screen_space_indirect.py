@@ -5,18 +5,18 @@ import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
 from scene_paths import OWN_SCENES
 
-from renderer.artist_parameters import ArtistParameters
-from renderer.capture import read_picture
-from renderer.comparison.gather_full_rsm import GatherFullRsm
-from renderer.dynamic_lights import DynamicLights, point_lights
-from renderer.runtime import Runtime
-from renderer.scene import Camera, Light, look_at, scaled
-from renderer.scene_file import read_scene
-from renderer.tuned_config import TunedConfig
-from renderer.view_placement import resolve_camera_and_lights
-from renderer.views import View, scaled_view
-from tuner.reference import reference_views
-from tuner.view_metrics import energy_ratio
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.capture import read_picture
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.scene.dynamic_lights import DynamicLights, point_lights
+from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.placement import resolve_camera_and_lights
+from vpltune.renderer.scene.scene import Camera, Light, look_at, scaled
+from vpltune.renderer.scene.views import View, scaled_view
+from vpltune.renderer.techniques.gather_full_rsm import GatherFullRsm
+from vpltune.tuner.metrics.view_metrics import energy_ratio
+from vpltune.tuner.reference import reference_views
 
 STRONG = {"falloff_footprint": 2.0, "screen_space_strength": 1.0}
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
 
-from renderer.artist_parameters import ArtistParameters
-from renderer.runtime import Runtime
-from renderer.tuned_config import TunedConfig
-from renderer.views import View
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.scene.views import View
 
 PAIRS = (("spot", "point"), ("point", "directional"), ("wide_spot", "spot"))
 ALL_KINDS = ("spot", "point", "directional")

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from built_scenes import colored_room, room_view
 
-from renderer.artist_parameters import ArtistParameters
-from renderer.runtime import Runtime
-from renderer.runtime_options import RuntimeOptions
-from renderer.tuned_config import TunedConfig
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.frame.runtime_options import RuntimeOptions
 
 FRAMES = 16
 STEP = 0.03

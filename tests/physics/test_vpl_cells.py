@@ -8,13 +8,13 @@ import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
 from converged_views import corner_view
 
-from renderer.artist_parameters import ArtistParameters
-from renderer.passes.vpl_cells import LARGEST_COUNT
-from renderer.runtime import Runtime
-from renderer.scene import Camera, Light, look_at, scaled
-from renderer.tuned_config import TunedConfig
-from renderer.views import View, scaled_view
-from tuner.fit_density import CELL_FOOTPRINT
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.passes.clustered_discs import LARGEST_COUNT
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.scene.scene import Camera, Light, look_at, scaled
+from vpltune.renderer.scene.views import View, scaled_view
+from vpltune.tuner.fitting.fit_density import CELL_FOOTPRINT
 
 
 def runtime_with(gl_context, scene=None, resolution=256, **parameters) -> Runtime:

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from built_scenes import quad, scene_of
 
-from renderer.artist_parameters import ArtistParameters
-from renderer.runtime import Runtime
-from renderer.scene import Camera, Light, look_at
-from renderer.tuned_config import TunedConfig
-from renderer.views import View
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.scene.scene import Camera, Light, look_at
+from vpltune.renderer.scene.views import View
 
 
 def runtime_of(scene, gl_context, **parameters) -> Runtime:

@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from renderer.vpl_disc_bounds import FADE_HEIGHT, LEAST_RADIUS
-from tuner.vpl_disc import disc_form, disc_past_chord
+from vpltune.renderer.frame.vpl_disc_bounds import FADE_HEIGHT, LEAST_RADIUS
+from vpltune.tuner.surrogate.vpl_disc import disc_form, disc_past_chord
 
 RINGS, SECTORS = 100, 200
 

@@ -5,11 +5,11 @@ import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
 from converged_views import corner_view
 
-from renderer.artist_parameters import ArtistParameters
-from renderer.runtime import Runtime
-from renderer.scene import Camera, look_at, scaled
-from renderer.tuned_config import TunedConfig
-from renderer.views import View, scaled_view
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.scene.scene import Camera, look_at, scaled
+from vpltune.renderer.scene.views import View, scaled_view
 
 
 def runtime_with(gl_context, scene=None, resolution=256, **parameters) -> Runtime:

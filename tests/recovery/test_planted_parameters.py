@@ -6,17 +6,17 @@ import pytest
 from built_scenes import colored_room, room_view
 from own_reference import own_reference
 
-from renderer.artist_parameters import ArtistParameters
-from renderer.runtime import Runtime
-from renderer.tuned_config import TunedConfig
-from tuner.captured_view import CapturedView
-from tuner.fit_placement import fit_placement
-from tuner.fit_status import FitStatus
-from tuner.reference.reference_view import ReferenceView
-from tuner.search_space import SearchSpace
-from tuner.tabulated_gather import gather_tabulated, tabulate_gather
-from tuner.virtual_point_lights import gather_inputs
-from tuner.vpl_gather import FalloffParameters
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.tuner.fitting.fit_placement import fit_placement
+from vpltune.tuner.fitting.fit_status import FitStatus
+from vpltune.tuner.fitting.search_space import SearchSpace
+from vpltune.tuner.reference.reference_view import ReferenceView
+from vpltune.tuner.surrogate.captured_view import CapturedView
+from vpltune.tuner.surrogate.tabulated_gather import gather_tabulated, tabulate_gather
+from vpltune.tuner.surrogate.virtual_point_lights import gather_inputs
+from vpltune.tuner.surrogate.vpl_gather import FalloffParameters
 
 PLANTED = ArtistParameters(intensity=1.35, falloff_footprint=0.8, falloff_transmittance=0.7, vpl_count=256)
 # Maps have parameters of their own, planted in test_planted_visibility.py.

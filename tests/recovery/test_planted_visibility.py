@@ -9,16 +9,21 @@ import pytest
 from built_scenes import colored_room, room_view
 from own_reference import own_reference
 
-from renderer.artist_parameters import ArtistParameters
-from renderer.runtime import Runtime
-from renderer.tuned_config import TunedConfig
-from tuner.captured_view import CapturedView
-from tuner.fit_placement import fit_placement
-from tuner.fit_visibility import SPACE, overlap_nodes, reduce_visibility, residuals
-from tuner.losses.relative_squared_error import target_of, weighted_squared_error
-from tuner.virtual_point_lights import Receivers, VirtualPointLights, gather_inputs
-from tuner.vpl_gather import FalloffParameters, gather
-from tuner.vpl_visibility import VisibilityParameters, map_texels, seen_share, surface_overlap
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.tuner.fitting.fit_placement import fit_placement
+from vpltune.tuner.fitting.fit_visibility import SPACE, overlap_nodes, reduce_visibility, residuals
+from vpltune.tuner.metrics.relative_squared_error import target_of, weighted_squared_error
+from vpltune.tuner.surrogate.captured_view import CapturedView
+from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights, gather_inputs
+from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, gather
+from vpltune.tuner.surrogate.vpl_visibility import (
+    VisibilityParameters,
+    map_texels,
+    seen_share,
+    surface_overlap,
+)
 
 PLANTED = ArtistParameters(
     intensity=1.3, falloff_footprint=0.6, vpl_count=256, visibility_bias=0.02, visibility_softness=0.2

@@ -1,8 +1,8 @@
 """The reference: what one bounce of indirect light really is, path-traced with Mitsuba."""
 
-from tuner.reference.reference_view import ReferenceView, noise_floor
-from tuner.reference.references import reference_views
-from tuner.reference.variant import MitsubaVariant, describe_variant
+from vpltune.tuner.reference.reference_view import ReferenceView, noise_floor
+from vpltune.tuner.reference.references import reference_views
+from vpltune.tuner.reference.variant import MitsubaVariant, describe_variant
 
 __all__ = [
     "MitsubaVariant",
@@ -17,7 +17,7 @@ __all__ = [
 def __getattr__(name: str):
     # `visibility` loads Mitsuba, which the names above do not.
     if name == "ray_traced_visibility":
-        from tuner.reference.visibility import ray_traced_visibility
+        from vpltune.tuner.reference.visibility import ray_traced_visibility
 
         return ray_traced_visibility
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

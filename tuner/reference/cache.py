@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import platformdirs
 
-from renderer.atomic_file import written_whole
-from renderer.errors import InputError
-from tuner.reference.reference_view import ReferenceView
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.files.atomic_file import written_whole
+from vpltune.tuner.reference.reference_view import ReferenceView
 
 SIZE_LIMIT = 2 * 2**30
 """Bytes kept; beyond them, the entries that were not used for longest go."""

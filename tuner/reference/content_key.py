@@ -6,8 +6,8 @@ import json
 
 import numpy as np
 
-from renderer.scene import Scene
-from renderer.views import View, light_to_json
+from vpltune.renderer.scene.scene import Scene
+from vpltune.renderer.scene.views import View, light_to_json
 
 ESTIMATOR_VERSION = 1
 """Raise whenever the estimator gives other numbers from the same scene: old entries are then passed over."""

@@ -20,12 +20,12 @@ from functools import partial
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, UInt32
 
-from renderer.views import View, ray_directions_world
-from tuner.reference.directions import cosine_direction
-from tuner.reference.punctual_lights import PunctualLights
-from tuner.reference.sobol import hashed, owen_scrambled, reversed_sobol_points
-from tuner.reference.surfaces import Surface, Surfaces
-from tuner.reference.unit_triangles import UnitTriangles
+from vpltune.renderer.scene.views import View, ray_directions_world
+from vpltune.tuner.reference.directions import cosine_direction
+from vpltune.tuner.reference.punctual_lights import PunctualLights
+from vpltune.tuner.reference.sobol import hashed, owen_scrambled, reversed_sobol_points
+from vpltune.tuner.reference.surfaces import Surface, Surfaces
+from vpltune.tuner.reference.unit_triangles import UnitTriangles
 
 LANE_SAMPLES_PER_LAUNCH = 2**21
 """Bounds the time of one kernel to a second or so: progress and interrupts come between kernels."""

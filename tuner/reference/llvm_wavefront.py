@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 from jaxtyping import Float, Float32, UInt32
 
-from tuner.reference.unit_triangles import UnitTriangles
+from vpltune.tuner.reference.unit_triangles import UnitTriangles
 
 Array = Any
 Vector = Any

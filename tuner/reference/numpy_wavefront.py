@@ -11,8 +11,8 @@ import drjit.scalar
 import mitsuba as mi
 import numpy as np
 
-from tuner.reference.llvm_wavefront import mitsuba_scene
-from tuner.reference.unit_triangles import UnitTriangles
+from vpltune.tuner.reference.llvm_wavefront import mitsuba_scene
+from vpltune.tuner.reference.unit_triangles import UnitTriangles
 
 
 class NumpyWavefront:

@@ -5,10 +5,10 @@ import math
 import numpy as np
 from jaxtyping import Float32
 
-from renderer.scene import Light
-from tuner.reference.directions import cone_direction, disc_point
-from tuner.reference.surfaces import Surface
-from tuner.reference.unit_triangles import UnitTriangles
+from vpltune.renderer.scene.scene import Light
+from vpltune.tuner.reference.directions import cone_direction, disc_point
+from vpltune.tuner.reference.surfaces import Surface
+from vpltune.tuner.reference.unit_triangles import UnitTriangles
 
 SHORTENING = 2.0**-13
 """A shadow ray stops this share of its length before a light, which may be set into a surface."""

@@ -4,12 +4,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from renderer.scene import Scene
-from renderer.views import View
-from tuner.reference import cache
-from tuner.reference.content_key import reference_key, scene_digest
-from tuner.reference.reference_view import ReferenceView, noise_floor
-from tuner.reference.variant import describe_variant
+from vpltune.renderer.scene.scene import Scene
+from vpltune.renderer.scene.views import View
+from vpltune.tuner.reference import cache
+from vpltune.tuner.reference.content_key import reference_key, scene_digest
+from vpltune.tuner.reference.reference_view import ReferenceView, noise_floor
+from vpltune.tuner.reference.variant import describe_variant
 
 FIRST_ROUND = 64
 """Samples per half before the noise is first looked at; each later round doubles what there is."""
@@ -88,8 +88,8 @@ def _rendered(
     report: Callable[[float], None],
 ) -> ReferenceView:
     # Here, so that a run whose references are all kept does not load Mitsuba.
-    from tuner.reference.indirect_irradiance import IndirectIrradiance
-    from tuner.reference.traced_scene import traced_scene
+    from vpltune.tuner.reference.indirect_irradiance import IndirectIrradiance
+    from vpltune.tuner.reference.traced_scene import traced_scene
 
     traced = traced_scene(scene)
     estimator = IndirectIrradiance(traced.wavefront, traced.surfaces, traced.triangles, view)

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from tuner.reference.unit_triangles import WRAP_MODES, UnitTriangles, srgb_decode_table
+from vpltune.tuner.reference.unit_triangles import WRAP_MODES, UnitTriangles, srgb_decode_table
 
 OFFSET = 2.0**-17
 """How far a ray starts off its surface, in scene diagonals.

@@ -4,10 +4,10 @@ import functools
 from dataclasses import dataclass
 from typing import Any
 
-from renderer.scene import Scene
-from tuner.reference.surfaces import Surfaces
-from tuner.reference.unit_triangles import UnitTriangles, unit_triangles
-from tuner.reference.variant import select_variant
+from vpltune.renderer.scene.scene import Scene
+from vpltune.tuner.reference.surfaces import Surfaces
+from vpltune.tuner.reference.unit_triangles import UnitTriangles, unit_triangles
+from vpltune.tuner.reference.variant import select_variant
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +33,9 @@ def traced_scene(scene: Scene) -> TracedScene:
 def _traced_scene(scene: Scene, variant: str) -> TracedScene:
     # Dr.Jit's array types differ by variant: each module is loaded only where its own is current.
     if variant == "scalar_rgb":
-        from tuner.reference.numpy_wavefront import NumpyWavefront as Wavefront
+        from vpltune.tuner.reference.numpy_wavefront import NumpyWavefront as Wavefront
     else:
-        from tuner.reference.llvm_wavefront import LlvmWavefront as Wavefront
+        from vpltune.tuner.reference.llvm_wavefront import LlvmWavefront as Wavefront
     triangles = unit_triangles(scene)
     wavefront = Wavefront(triangles)
     return TracedScene(triangles, wavefront, Surfaces(wavefront, triangles))

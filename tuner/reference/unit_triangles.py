@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Float32, Float64, Int64, UInt32
 
-from renderer.errors import InputError
-from renderer.scene import Light, Mesh, Scene, transform_normals, transform_points
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.scene.scene import Light, Mesh, Scene, transform_normals, transform_points
 
 WRAP_MODES = ("repeat", "mirrored_repeat", "clamp_to_edge")
 

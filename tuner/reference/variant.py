@@ -23,9 +23,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
-from renderer.atomic_file import write_text_whole
-from renderer.errors import InputError
-from tuner.reference.cache import cache_folder, locked
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.files.atomic_file import write_text_whole
+from vpltune.tuner.reference.cache import cache_folder, locked
 
 LIBRARIES_TRIED = 4
 PROBE_SECONDS = 60.0

@@ -5,9 +5,9 @@ from functools import partial
 import numpy as np
 from jaxtyping import Bool, Float
 
-from renderer.scene import Scene
-from tuner.reference.surfaces import OFFSET
-from tuner.reference.traced_scene import TracedScene, traced_scene
+from vpltune.renderer.scene.scene import Scene
+from vpltune.tuner.reference.surfaces import OFFSET
+from vpltune.tuner.reference.traced_scene import TracedScene, traced_scene
 
 LIFT = 4.0 * OFFSET
 """How far both ends are lifted off their surfaces, in scene diagonals: four times what exact hits need,

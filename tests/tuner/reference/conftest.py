@@ -10,8 +10,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from renderer.scene import Camera, Instance, Light, Material, Mesh, Scene, Texture, look_at
-from renderer.views import View, ray_directions_world
+from vpltune.renderer.scene.scene import Camera, Instance, Light, Material, Mesh, Scene, Texture, look_at
+from vpltune.renderer.scene.views import View, ray_directions_world
 
 
 @pytest.fixture(autouse=True)
@@ -130,7 +130,7 @@ def shapes() -> SimpleNamespace:
 @pytest.fixture
 def mitsuba():
     """Mitsuba with the LLVM variant current."""
-    from tuner.reference.variant import select_variant
+    from vpltune.tuner.reference.variant import select_variant
 
     if select_variant().name != "llvm_ad_rgb":
         pytest.skip("needs Mitsuba's llvm_ad_rgb variant")

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer.scene import Light, Material, Texture
-from tuner.reference import ReferenceView, reference_views
+from vpltune.renderer.scene.scene import Light, Material, Texture
+from vpltune.tuner.reference import ReferenceView, reference_views
 
 DOWN = np.array([0.0, -1.0, 0.0])
 

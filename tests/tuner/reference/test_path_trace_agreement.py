@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from renderer.scene import Scene, Texture
-from renderer.views import View
-from tuner.reference import reference_views
+from vpltune.renderer.scene.scene import Scene, Texture
+from vpltune.renderer.scene.views import View
+from vpltune.tuner.reference import reference_views
 
 SIGNIFICANCE = 0.01
 SHARE_THAT_PASSES = 0.9975
@@ -110,7 +110,7 @@ def test_the_check_sees_what_is_wrong(mitsuba, shapes):
 def test_scenes_that_others_made(
     mitsuba, shapes, scenes_folder, name, eye, target, degrees, position, direction
 ):
-    from renderer.scene_file import read_scene
+    from vpltune.renderer.scene.files import read_scene
 
     path = next((path for path in sorted((scenes_folder / name).glob("*.gl[bt]*"))), None)
     if path is None:

@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer.scene import scaled
-from renderer.views import scaled_view
-from tuner.reference import ReferenceView, cache, noise_floor, reference_views
+from vpltune.renderer.scene.scene import scaled
+from vpltune.renderer.scene.views import scaled_view
+from vpltune.tuner.reference import ReferenceView, cache, noise_floor, reference_views
 
 PICTURES = ("irradiance_a", "irradiance_b", "direct_irradiance", "albedo", "position_world", "normal_world")
 
@@ -100,7 +100,7 @@ def test_kept_references_are_found_without_mitsuba(shapes, monkeypatch, tmp_path
     scene, view = shapes.box_room(), shapes.box_room_view((8, 6))
     arguments = {"noise_target": 0.0, "max_samples": 16}
     made = reference_views(scene, (view,), **arguments)[0]
-    monkeypatch.setattr("tuner.reference.references._rendered", None)
+    monkeypatch.setattr("vpltune.tuner.reference.references._rendered", None)
     assert same(made, reference_views(scene, (view,), **arguments)[0])
     # Names are no part of what a reference is made from.
     renamed = replace(scene, name="another name")
@@ -119,7 +119,7 @@ def test_anything_that_matters_makes_another_reference(shapes, monkeypatch, tmp_
             | {"position_world": np.zeros((6, 8, 3)), "valid": np.zeros((6, 8), bool), "samples": 1}
         )
 
-    monkeypatch.setattr("tuner.reference.references._rendered", counted)
+    monkeypatch.setattr("vpltune.tuner.reference.references._rendered", counted)
     mesh = scene.meshes[0]
     moved = mesh.positions.copy()
     moved[0, 0] = np.nextafter(moved[0, 0], np.float32(9.0))
@@ -217,7 +217,7 @@ def test_scalar_fallback_agrees_within_noise(shapes, tmp_path):
     base = reference_views(scene, (view,), **arguments)[0]
     (tmp_path / "job").write_bytes(pickle.dumps((scene, view, arguments)))
     program = (
-        "import pickle, sys, numpy; from tuner.reference import *;"
+        "import pickle, sys, numpy; from vpltune.tuner.reference import *;"
         "assert describe_variant().name == 'scalar_rgb';"
         "scene, view, arguments = pickle.load(open(sys.argv[1], 'rb'));"
         "r = reference_views(scene, (view,), **arguments)[0];"
@@ -242,7 +242,7 @@ def test_processes_make_a_reference_once(shapes, tmp_path, count):
     """All start at once on the same view; one renders, the others wait and find it."""
     (tmp_path / "job").write_bytes(pickle.dumps((shapes.box_room(), shapes.box_room_view((32, 24)))))
     program = (
-        "import pickle, sys; from tuner.reference import references;"
+        "import pickle, sys; from vpltune.tuner.reference import references;"
         "scene, view = pickle.load(open(sys.argv[1], 'rb')); render = references._rendered\n"
         "def told(*rest):\n    print('rendered', flush=True)\n    return render(*rest)\n"
         "references._rendered = told\n"
@@ -268,7 +268,7 @@ def test_a_killed_renderer_hands_over_and_leaves_nothing(shapes, tmp_path):
     scene, view = shapes.box_room(), shapes.box_room_view((8, 6))
     (tmp_path / "job").write_bytes(pickle.dumps((scene, view)))
     program = (
-        "import os, pickle, sys; from pathlib import Path; from tuner.reference import references\n"
+        "import os, pickle, sys; from pathlib import Path; from vpltune.tuner.reference import references\n"
         "scene, view = pickle.load(open(sys.argv[1], 'rb'))\n"
         "def chmod(path, mode):\n    if path.suffix == '.reference': os.kill(os.getpid(), 9)\n"
         "if sys.argv[2] == 'dies': Path.chmod = chmod\n"

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from tuner.reference.directions import cone_direction, cosine_direction, disc_point
-from tuner.reference.sobol import hashed, owen_scrambled, reversed_sobol_points
+from vpltune.tuner.reference.directions import cone_direction, cosine_direction, disc_point
+from vpltune.tuner.reference.sobol import hashed, owen_scrambled, reversed_sobol_points
 
 
 @pytest.fixture
 def numpy_arrays(monkeypatch):
     """The numpy twin's arithmetic, without a scene."""
     pytest.importorskip("mitsuba").set_variant("scalar_rgb")
-    from tuner.reference.numpy_wavefront import NumpyWavefront
+    from vpltune.tuner.reference.numpy_wavefront import NumpyWavefront
 
     yield object.__new__(NumpyWavefront)
-    from tuner.reference.variant import select_variant
+    from vpltune.tuner.reference.variant import select_variant
 
     select_variant()
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer.errors import InputError
-from renderer.scene import Material
-from tuner.reference.unit_triangles import unit_triangles
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.scene.scene import Material
+from vpltune.tuner.reference.unit_triangles import unit_triangles
 
 
 def with_mesh(scene, **changes):

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from renderer.errors import InputError
-from tuner.reference import describe_variant, variant
+from vpltune.renderer.errors import InputError
+from vpltune.tuner.reference import describe_variant, variant
 
 
 @pytest.fixture(autouse=True)
@@ -92,7 +92,7 @@ def test_libraries_are_sorted_newest_first(monkeypatch, tmp_path):
 
 def test_asking_loads_no_mitsuba():
     program = (
-        "import sys; from tuner.reference import describe_variant, noise_floor, reference_views;"
+        "import sys; from vpltune.tuner.reference import describe_variant, noise_floor, reference_views;"
         "describe_variant();"
         "print([name for name in ('mitsuba', 'drjit', 'jax') if name in sys.modules])"
     )

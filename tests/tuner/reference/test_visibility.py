@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from renderer.scene import scaled
-from tuner.reference import ray_traced_visibility
+from vpltune.renderer.scene.scene import scaled
+from vpltune.tuner.reference import ray_traced_visibility
 
 UP = np.array([0.0, 1.0, 0.0])
 

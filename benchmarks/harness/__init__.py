@@ -1,0 +1,1 @@
+"""What every benchmark needs: rows, the registry, scenes, the machine."""

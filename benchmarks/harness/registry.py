@@ -1,0 +1,33 @@
+"""Finds benchmarks and runs them."""
+
+import ast
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+
+from benchmarks.harness.row import Row
+
+FOLDERS = ("speed", "quality", "tuning")
+
+
+def benchmark_names() -> tuple[str, ...]:
+    """Names of all benchmarks, in alphabetical order."""
+    return tuple(sorted(_modules()))
+
+
+def run_benchmark(name: str, progress: Callable[[str, float], None]) -> list[Row]:
+    """Run the benchmark called `name`, one of `benchmark_names()`."""
+    return importlib.import_module(_modules()[name]).rows(progress)
+
+
+def _modules() -> dict[str, str]:
+    """Benchmark name to module: the files of `FOLDERS` that define `rows`. None of them is imported."""
+    return {
+        path.stem: f"benchmarks.{folder}.{path.stem}"
+        for folder in FOLDERS
+        for path in sorted((Path(__file__).parents[1] / folder).glob("*.py"))
+        if any(
+            isinstance(node, ast.FunctionDef) and node.name == "rows"
+            for node in ast.parse(path.read_text(encoding="utf-8")).body
+        )
+    }

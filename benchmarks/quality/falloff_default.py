@@ -1,0 +1,60 @@
+"""Why α is 0.5 by default: what each α costs in error and in energy at 1,024 VPLs.
+
+Compared with 32,768 VPLs at α = 0.25, where neither noise nor lost energy counts any more. No visibility and
+no path tracer is involved: it is the point spread alone that is measured.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from benchmarks.harness.row import Row
+from benchmarks.harness.scene_library import OWN_SCENES
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.gpu.gpu_context import create_context
+from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.views import View
+from vpltune.tuner.metrics.view_metrics import energy_ratio, relmse
+
+ALPHAS = (0.25, 0.5, 0.7, 1.0)
+VPLS = 1_024
+CONVERGED = ArtistParameters(vpl_count=32_768, falloff_footprint=0.25)
+ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.15, 0.45))
+SIZE = (96, 72)
+
+
+def rows(progress: Callable[[str, float], None]) -> list[Row]:
+    """relMSE and energy of each α against the converged picture: means over our scenes and rotations."""
+    context = create_context()
+    figures: dict[float, list[tuple[float, float]]] = {alpha: [] for alpha in ALPHAS}
+    for index, path in enumerate(OWN_SCENES):
+        progress("falloff_default", index / len(OWN_SCENES))
+        scene = read_scene(path)
+        view = View(path.stem, "fitted", SIZE, scene.cameras[0], scene.lights)
+        runtime = Runtime(scene, TunedConfig(visibility="none"), context=context)
+        converged = _irradiance(runtime, view, CONVERGED, (0.0, 0.0))
+        for alpha in ALPHAS:
+            parameters = ArtistParameters(vpl_count=VPLS, falloff_footprint=alpha)
+            for rotation in ROTATIONS:
+                picture = _irradiance(runtime, view, parameters, rotation)
+                figures[alpha].append((relmse(picture, converged), energy_ratio(picture, converged)))
+    means = {alpha: np.mean(values, axis=0) for alpha, values in figures.items()}
+    progress("falloff_default", 1.0)
+    return [
+        row
+        for alpha in ALPHAS
+        for row in (
+            Row(f"alpha_{alpha}_relmse", float(means[alpha][0]), "1", "alpha 1", float(means[1.0][0])),
+            Row(f"alpha_{alpha}_energy", float(means[alpha][1]), "1", "converged", 1.0),
+        )
+    ]
+
+
+def _irradiance(
+    runtime: Runtime, view: View, parameters: ArtistParameters, rotation: tuple[float, float]
+) -> np.ndarray:
+    runtime.parameters = parameters
+    captured = runtime.capture(view, rotation)
+    return captured.indirect_irradiance[captured.valid]

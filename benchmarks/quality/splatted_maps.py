@@ -1,0 +1,212 @@
+"""The rival of cast visibility maps: imperfect shadow maps, splatted from points (Ritschel et al. 2008).
+
+Every VPL projects its own random `POINTS` of the scene's surface into a `SIZE`² map, nearest first, each as
+wide as its share of the surface looks; holes are filled by pull-push. That is 4,096 points a VPL where a cast
+map takes some 1,500 rays. Looked up as our maps are, by the point's plane; and by depth as in the paper, with
+whichever of `BIASES` serves the scene best. In numpy: what is compared is the error, by default parameters.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float64, Int64
+
+from benchmarks.harness.row import Row
+from benchmarks.harness.scene_library import present_scenes
+from benchmarks.quality.visibility_quality import ray_visibility
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.scene.scene import Scene, transform_points
+from vpltune.tuner.evaluation.evaluate import surrogate_irradiance
+from vpltune.tuner.evaluation.prepare_scene import PreparedScene, SceneOptions, Stopwatch, prepare_scene
+from vpltune.tuner.metrics.view_metrics import relmse
+from vpltune.tuner.surrogate.captured_view import CapturedView, runtime_irradiance
+from vpltune.tuner.surrogate.virtual_point_lights import gather_inputs
+from vpltune.tuner.surrogate.vpl_visibility import (
+    MapTexels,
+    VisibilityParameters,
+    hemi_octahedral_encode,
+    hemisphere_frame,
+    visibility_origin,
+    vpl_visibility,
+)
+
+SCENES = (
+    "cornell-box",
+    "gallery",
+    "godot-zdm2",
+    "kajiya-cornell-box",
+    "nvpro-cornellbox",
+    "playcanvas-house",
+)
+VPLS = 256
+SIZE = 64
+POINTS = 4096
+POOL = 1 << 17
+"""Points of the whole surface, of which each VPL draws its own."""
+WIDEST = 2
+"""Texels that a splat reaches from its centre; what is nearer to the VPL leaves holes, which are filled."""
+BIASES = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2)
+"""Of the distance."""
+DEFAULT = ArtistParameters(vpl_count=VPLS)
+
+
+@dataclass(frozen=True, eq=False)
+class SurfacePoints:
+    """Spread evenly over the surface; lengths in world units."""
+
+    position: Float64[np.ndarray, "points 3"]
+    normal: Float64[np.ndarray, "points 3"]
+    area: float
+    """Of the whole surface."""
+
+
+def rows(progress: Callable[[str, float], None]) -> list[Row]:
+    """For each scene `<scene>_splatted` and `<scene>_splatted_by_depth`: relMSE against that of cast maps."""
+    present = present_scenes()
+    names = [name for name in SCENES if name in present]
+    found = []
+    for index, name in enumerate(names):
+        progress(f"splatted_maps: {name}", index / len(names))
+        config = TunedConfig(DEFAULT, visibility="maps")
+        prepared = prepare_scene(
+            present[name], SceneOptions(views=2), config, Stopwatch(), lambda stage, share: None
+        )
+        found += _scene_rows(name, prepared)
+    progress("splatted_maps", 1.0)
+    return found
+
+
+def _scene_rows(name: str, prepared: PreparedScene) -> list[Row]:
+    random = np.random.default_rng(2008)
+    points = surface_points(prepared.scene, POOL, random)
+    by_plane, by_depth, cast, traced = [], [], [], []
+    for view in prepared.views:
+        texels = splatted_texels(view, points, random)
+        receivers, vpls = gather_inputs(view.captured)
+        planes = vpl_visibility(receivers, vpls, texels, VisibilityParameters.of(DEFAULT))
+        by_plane.append(_error(view, np.asarray(planes)))
+        by_depth.append([_error(view, seen) for seen in _seen_by_depth(view, texels)])
+        drawn = runtime_irradiance(prepared.runtime, DEFAULT, view)
+        cast.append(relmse(drawn[view.valid], view.reference.irradiance[view.valid]))
+        traced.append(_error(view, ray_visibility(prepared, view)))
+    ours = float(np.mean(cast))
+    return [
+        Row(f"{name}_splatted", float(np.mean(by_plane)), "1", "cast maps", ours),
+        Row(f"{name}_splatted_by_depth", float(np.mean(by_depth, axis=0).min()), "1", "cast maps", ours),
+        Row(f"{name}_ray_traced", float(np.mean(traced)), "1", "cast maps", ours),
+    ]
+
+
+def surface_points(scene: Scene, count: int, random: np.random.Generator) -> SurfacePoints:
+    """`count` random points, uniform in area."""
+    corners = np.concatenate(
+        [
+            transform_points(instance.to_world, mesh.positions)[mesh.triangles]
+            for instance in scene.instances
+            for mesh in (scene.meshes[instance.mesh],)
+        ]
+    ).astype(np.float64)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    twice_area = np.linalg.norm(across, axis=1)
+    chosen = random.choice(len(corners), count, p=twice_area / twice_area.sum())
+    root, other = np.sqrt(random.random(count)), random.random(count)
+    weights = np.stack([1.0 - root, root * (1.0 - other), root * other], axis=1)
+    position = np.einsum("pc,pcx->px", weights, corners[chosen])
+    return SurfacePoints(position, across[chosen] / twice_area[chosen, None], 0.5 * twice_area.sum())
+
+
+def splatted_texels(view: CapturedView, points: SurfacePoints, random: np.random.Generator) -> MapTexels:
+    """The maps of a view's VPLs, in the form that our lookup takes."""
+    captured = view.captured
+    _, vpls = gather_inputs(captured)
+    frames = np.asarray(hemisphere_frame(vpls.normal), np.float64)
+    lift = np.asarray(visibility_origin(vpls) - vpls.position, np.float64) * captured.scene_length
+    origins = captured.vpl_position_world.astype(np.float64) + lift
+    width = np.sqrt(points.area / POINTS / np.pi)
+    ends, normals = [], []
+    for origin, frame in zip(origins, frames, strict=True):
+        own = random.choice(len(points.position), POINTS, replace=False)
+        offset = (points.position[own] - origin) @ frame.T
+        normal = points.normal[own] @ frame.T
+        normal *= np.where((offset * normal).sum(1) > 0.0, -1.0, 1.0)[:, None]
+        nearest = _filled(_splatted(offset, width), np.linalg.norm(offset, axis=1))
+        # Where nothing was splatted anywhere, a wall far away that faces the VPL.
+        far = np.array([[0.0, 0.0, 1e3 * captured.scene_length]])
+        ends.append(np.concatenate([offset, far])[nearest] / captured.scene_length)
+        normals.append(np.concatenate([normal, [[0.0, 0.0, -1.0]]])[nearest])
+    shape = (len(origins), SIZE, SIZE)
+    end, normal = (jnp.asarray(np.reshape(part, (-1, 3)), jnp.float32) for part in (ends, normals))
+    return MapTexels(end, normal, jnp.full(shape, -1, jnp.int32), 1)
+
+
+def _splatted(offset: Float64[np.ndarray, "points 3"], width: float) -> Int64[np.ndarray, "size size"]:
+    """The nearest point in each texel; -1 in holes."""
+    distance, texel = np.linalg.norm(offset, axis=1), _texel(offset)
+    # A hemisphere of 2π on SIZE² texels: what a texel spans at a unit's distance.
+    texel_width = np.sqrt(2.0 * np.pi) / SIZE
+    reach = np.minimum(np.rint(width / distance / texel_width - 0.5), WIDEST)
+    nearest = np.full((SIZE, SIZE), -1, np.int64)
+    far_first = np.argsort(-distance)
+    far_first = far_first[offset[far_first, 2] > 0.0]
+    for y in range(-WIDEST, WIDEST + 1):
+        for x in range(-WIDEST, WIDEST + 1):
+            order = far_first[reach[far_first] >= max(abs(x), abs(y))]
+            row, column = texel[order, 1] + y, texel[order, 0] + x
+            inside = (row >= 0) & (row < SIZE) & (column >= 0) & (column < SIZE)
+            layer = np.full((SIZE, SIZE), -1, np.int64)
+            layer[row[inside], column[inside]] = order[inside]
+            nearest = _nearer(nearest, layer, distance)
+    return nearest
+
+
+def _filled(
+    nearest: Int64[np.ndarray, "size size"], distance: Float64[np.ndarray, " points"]
+) -> Int64[np.ndarray, "size size"]:
+    """Pull-push: a hole takes the nearest point of the smallest square around it that has any."""
+    if len(nearest) == 1:
+        return nearest
+    coarse = nearest[::2, ::2]
+    for y, x in ((0, 1), (1, 0), (1, 1)):
+        coarse = _nearer(coarse, nearest[y::2, x::2], distance)
+    coarse = _filled(coarse, distance)
+    return np.where(nearest < 0, coarse.repeat(2, axis=0).repeat(2, axis=1), nearest)
+
+
+def _nearer(
+    a: Int64[np.ndarray, "rows columns"],
+    b: Int64[np.ndarray, "rows columns"],
+    distance: Float64[np.ndarray, " points"],
+) -> Int64[np.ndarray, "rows columns"]:
+    distances = np.concatenate([distance, [np.inf]])
+    return np.where(distances[b] < distances[a], b, a)
+
+
+def _texel(offset: Float64[np.ndarray, "n 3"]) -> Int64[np.ndarray, "n 2"]:
+    """Column and row of the texel in each direction; below the horizon, of some texel at the border."""
+    upper = np.concatenate([offset[:, :2], np.maximum(offset[:, 2:], 1e-9)], axis=1)
+    direction = upper / np.linalg.norm(upper, axis=1, keepdims=True)
+    place = (np.asarray(hemi_octahedral_encode(jnp.asarray(direction))) * 0.5 + 0.5) * SIZE
+    return np.clip(place.astype(np.int64), 0, SIZE - 1)
+
+
+def _seen_by_depth(view: CapturedView, texels: MapTexels) -> list[np.ndarray]:
+    """Visibility [receivers, vpls] for each of `BIASES`."""
+    receivers, vpls = gather_inputs(view.captured)
+    frames, origins = np.asarray(hemisphere_frame(vpls.normal)), np.asarray(visibility_origin(vpls))
+    depth = np.linalg.norm(np.asarray(texels.end), axis=1).reshape(len(origins), SIZE, SIZE)
+    seen = np.ones((len(BIASES), len(receivers.position), len(origins)), np.float32)
+    for index, (origin, frame) in enumerate(zip(origins, frames, strict=True)):
+        offset = ((np.asarray(receivers.position) - origin) @ frame.T).astype(np.float64)
+        distance = np.linalg.norm(offset, axis=1)
+        column, row = _texel(offset).T
+        for number, bias in enumerate(BIASES):
+            seen[number, :, index] = distance * (1.0 - bias) <= depth[index, row, column]
+    return list(seen)
+
+
+def _error(view: CapturedView, visibility: np.ndarray) -> float:
+    picture = surrogate_irradiance(view, DEFAULT, jnp.asarray(visibility))
+    return relmse(picture[view.valid], view.reference.irradiance[view.valid])

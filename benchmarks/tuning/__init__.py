@@ -1,0 +1,1 @@
+"""Benchmarks of fits, searches and the prior."""

@@ -1,0 +1,1 @@
+"""Exports for other programs: scene bundle, web page, shader constants, glTF."""

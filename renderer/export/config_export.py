@@ -1,0 +1,129 @@
+"""A tuned config as another program takes it: JSON, constants for a shader, a C header, bytes of a block."""
+
+from collections.abc import Callable
+from typing import Literal, get_args
+
+from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters, ParameterSpec
+from vpltune.renderer.config.parameter_block import BLOCK_BYTES, BLOCK_FIELDS, pack_parameters
+from vpltune.renderer.config.tuned_config import VISIBILITIES, TunedConfig, config_text
+from vpltune.renderer.errors import InputError
+
+ExportFormat = Literal["json", "glsl", "c", "std140"]
+EXPORT_FORMATS: tuple[ExportFormat, ...] = get_args(ExportFormat)
+
+_VISIBILITY_CODES = ", ".join(f"{code} {name}" for code, name in enumerate(VISIBILITIES))
+
+
+def exported(config: TunedConfig, export_format: ExportFormat) -> bytes:
+    """The contents of the exported file.
+
+    Raises:
+        InputError: a value is out of range, or the form has no place for a prior.
+    """
+    if export_format != "json":
+        refuse_prior(config, export_format)
+    if export_format == "std140":
+        return pack_parameters(config.parameters)
+    texts: dict[ExportFormat, Callable[[TunedConfig], str]] = {
+        "json": config_text,
+        "glsl": glsl_constants,
+        "c": c_header,
+    }
+    return texts[export_format](config).encode("ascii")
+
+
+def refuse_prior(config: TunedConfig, form: str) -> None:
+    """Raise InputError where a config has a prior, for forms that hold parameters alone."""
+    if config.auto is not None:
+        raise InputError(
+            f"--to {form}: a config with 'auto' sets its parameters anew in each frame; "
+            "fit a scene from it first: vpltune fit SCENE --config auto"
+        )
+
+
+def glsl_constants(config: TunedConfig) -> str:
+    """Constant declarations, valid in GLSL 3.30 and later and in GLSL ES 3.00.
+
+    Where VPL_PARAMETER_BLOCK is defined, the same names are members of a uniform block, which the bytes of
+    `--to std140` fill: a shader is written once, and tuned live or compiled with its numbers.
+
+    ASCII only, because GLSL before 4.20 allows nothing else even in comments; so names stand there,
+    and symbols do not.
+
+    Raises:
+        InputError: a value is out of range.
+    """
+    values = _checked(config)
+    lines = [
+        "// Written by `vpltune export --to glsl`. No value has a world unit.",
+        "#ifdef VPL_PARAMETER_BLOCK",
+    ]
+    lines += ["layout(std140) uniform VplParameters {"]
+    lines += [f"    {_glsl_type(spec)} {constant_name(spec)};  // {spec.unit}" for spec in ARTIST_PARAMETERS]
+    lines += ["};", "#else"]
+    # repr of a float always has a point or an exponent, and both forms are GLSL float literals.
+    lines += [
+        f"const {_glsl_type(spec)} {constant_name(spec)} = {values[spec.name]!r}; // {spec.unit}"
+        for spec in ARTIST_PARAMETERS
+    ]
+    lines += ["#endif", f"const int VPL_VISIBILITY = {_visibility_code(config)}; // {_VISIBILITY_CODES}"]
+    return "\n".join(lines) + "\n"
+
+
+def c_header(config: TunedConfig) -> str:
+    """A C99 and C++ header: each value as a macro with all its digits, and as a struct laid out as the block.
+
+    Raises:
+        InputError: a value is out of range.
+    """
+    values = _checked(config)
+    padding = BLOCK_BYTES // 4 - len(BLOCK_FIELDS)
+    macros = [
+        f"#define {constant_name(spec)} {values[spec.name]!r} /* {spec.unit} */" for spec in ARTIST_PARAMETERS
+    ]
+    members = [
+        f"    {'int32_t' if spec.whole_number else 'float'} {spec.name}; /* {spec.unit} */"
+        for spec in ARTIST_PARAMETERS
+    ]
+    members += [f"    float padding[{padding}];"] * (padding > 0)
+    initial = [
+        f"    {constant_name(spec) if spec.whole_number else f'(float){constant_name(spec)}'},"
+        for spec in ARTIST_PARAMETERS
+    ]
+    return "\n".join(
+        [
+            "/* Written by `vpltune export --to c`. No value has a world unit. */",
+            "#ifndef VPLTUNE_PARAMETERS_H",
+            "#define VPLTUNE_PARAMETERS_H",
+            "#include <stdint.h>",
+            *macros,
+            f"#define VPL_VISIBILITY {_visibility_code(config)} /* {_VISIBILITY_CODES} */",
+            "/* Byte for byte the std140 uniform block of `vpltune export --to std140`. */",
+            "struct vpl_parameters {",
+            *members,
+            "};",
+            "static const struct vpl_parameters vpl_parameters = {",
+            *initial,
+            *["    {0}"] * (padding > 0),
+            "};",
+            "#endif",
+            "",
+        ]
+    )
+
+
+def constant_name(spec: ParameterSpec) -> str:
+    """The constant's name in GLSL and C: VPL_INTENSITY, VPL_COUNT, …"""
+    return f"VPL_{spec.name.removeprefix('vpl_').upper()}"
+
+
+def _checked(config: TunedConfig) -> dict[str, float | int]:
+    return ArtistParameters.validated(config.parameters.as_dict()).as_dict()
+
+
+def _glsl_type(spec: ParameterSpec) -> str:
+    return "int" if spec.whole_number else "float"
+
+
+def _visibility_code(config: TunedConfig) -> int:
+    return VISIBILITIES.index(config.visibility)

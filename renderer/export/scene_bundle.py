@@ -1,0 +1,264 @@
+"""One view of a scene with its tuned config, as plain numbers that any program can read: JSON and one .bin.
+
+Everything that the runtime draws from is there, and nothing that it draws: triangles in world space, texels,
+camera, lights and the faces of their reflective shadow maps, the config. `examples/standalone_reader.py`
+draws the picture from it without this package; the page of `vpltune export --to web` carries one inside.
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vpltune.renderer.config.tuned_config import TunedConfig, config_text
+from vpltune.renderer.files.atomic_file import written_whole
+from vpltune.renderer.frame import vpl_disc_bounds
+from vpltune.renderer.frame.passes import vpl_importance
+from vpltune.renderer.frame.passes.clustered_discs import LARGEST_COUNT, NORMAL_REACH, sample_count
+from vpltune.renderer.frame.passes.tone_mapping import EXPOSURE_KEY
+from vpltune.renderer.frame.point_table import R2_STEPS
+from vpltune.renderer.frame.runtime import FEW_FACES, RSM_RESOLUTION, RSM_RESOLUTION_OF_MANY
+from vpltune.renderer.frame.runtime_options import RuntimeOptions
+from vpltune.renderer.frame.visibility_map_layout import NO_MAPS, VisibilityMapLayout
+from vpltune.renderer.gpu.camera_uniforms import camera_uniforms
+from vpltune.renderer.gpu.render_targets import MAX_ATLAS_COLUMNS
+from vpltune.renderer.scene.animation import AnimationPlayer
+from vpltune.renderer.scene.light_faces import FaceSnapping, LightRecords, light_records
+from vpltune.renderer.scene.placed_boxes import placed_boxes
+from vpltune.renderer.scene.scene import Scene, Texture, transform_normals, transform_points
+from vpltune.renderer.scene.views import View, light_to_json
+
+FORMAT = "vpltune-bundle"
+VERSION = 1
+# What triangles without a texture look up.
+WHITE = Texture("white", np.full((1, 1, 3), 255, np.uint8))
+DOCUMENT_NAME, BINARY_NAME = "bundle.json", "bundle.bin"
+
+
+@dataclass(frozen=True)
+class SceneBundle:
+    """The document, and the bytes that its offsets count in."""
+
+    document: dict[str, Any]
+    binary: bytes
+
+
+def scene_bundle(
+    scene: Scene, view: View, config: TunedConfig, *, rsm_resolution: int | None = None
+) -> SceneBundle:
+    """The bundle of a scene at rest, for the runtime with its default options and the same `rsm_resolution`.
+
+    Raises:
+        InputError: the config holds a value that is out of range.
+    """
+    rest = AnimationPlayer(scene).rest_pose()
+    bounds = placed_boxes(scene).bounds(rest.transforms, rest.joint_matrices)
+    binary = _Binary()
+    draws = _draws(scene, binary)
+    count = len(light_records(view.lights, bounds).faces)
+    resolution = rsm_resolution or (RSM_RESOLUTION if count <= FEW_FACES else RSM_RESOLUTION_OF_MANY)
+    snapping = FaceSnapping(float(np.linalg.norm(bounds[1] - bounds[0])), resolution)
+    records = light_records(view.lights, bounds, snapping)
+    _add_light_records(view, records, resolution, binary)
+    columns, rows = _atlas(records)
+    uniforms = camera_uniforms(view.camera, view.size, bounds)
+    options = RuntimeOptions()
+    document = {
+        "format": FORMAT,
+        "version": VERSION,
+        "scene": scene.name,
+        "config": json.loads(config_text(config)),
+        "view": {
+            "size": list(view.size),
+            "camera_to_world": view.camera.to_world.tolist(),
+            "tan_half_fov": list(uniforms.tan_half_fov),
+            "near_plane": uniforms.near_plane,
+            "exposure_key": EXPOSURE_KEY,
+        },
+        "bounds": bounds.tolist(),
+        "diagonal": float(np.linalg.norm(bounds[1] - bounds[0])),
+        "lights": [light_to_json(light) for light in view.lights],
+        "rsm": {
+            "resolution": resolution,
+            "atlas": [resolution * rows, resolution * columns],
+            "filtering": options.rsm_filtering,
+            "moment_origin": list(records.moment_origin),
+            "faces": _faces(records, resolution),
+        },
+        "point_table": {"kind": "r2", "steps": list(R2_STEPS)},
+        "vpl_importance": _vpl_importance(config, count),
+        "vpl_cells": _vpl_cells(config),
+        "visibility_maps": _visibility_maps(options, config),
+        "draws": draws,
+        "textures": [_texture(texture, binary) for texture in (*scene.textures, WHITE)],
+        "arrays": binary.arrays,
+    }
+    return SceneBundle(document, bytes(binary.content))
+
+
+def _vpl_importance(config: TunedConfig, face_count: int) -> dict[str, Any]:
+    used = config.parameters.density_importance > 0.0
+    return {
+        "cells": vpl_importance.importance_cells(face_count) if used else 0,
+        "receivers": vpl_importance.RECEIVERS,
+        "spread": vpl_importance.SPREAD,
+        "dark_share": vpl_importance.DARK_SHARE,
+        "least": vpl_importance.LEAST_IMPORTANCE,
+    }
+
+
+def _vpls_are_cells(config: TunedConfig) -> bool:
+    return config.parameters.density_relaxation > 0 and config.parameters.vpl_count <= LARGEST_COUNT
+
+
+def _vpl_cells(config: TunedConfig) -> dict[str, Any]:
+    return {
+        # 0: VPLs are points, and the rest says nothing.
+        "steps": config.parameters.density_relaxation if _vpls_are_cells(config) else 0,
+        "samples": sample_count(config.parameters.vpl_count),
+        "normal_reach": NORMAL_REACH,
+        "disc": {
+            "least_part": vpl_disc_bounds.LEAST_PART,
+            "least_radius": vpl_disc_bounds.LEAST_RADIUS,
+            "fade_height": vpl_disc_bounds.FADE_HEIGHT,
+        },
+    }
+
+
+def _visibility_maps(options: RuntimeOptions, config: TunedConfig) -> dict[str, int]:
+    layout = VisibilityMapLayout.of(options) if config.visibility == "maps" else NO_MAPS
+    vpl_count = config.parameters.vpl_count
+    blocks = layout.blocks(vpl_count)
+    return {
+        "map_size": layout.size,
+        "map_refinement": layout.refinement,
+        "map_blocks": blocks,
+        "map_room": vpl_count * layout.size**2 + blocks * layout.refinement**2,
+    }
+
+
+def left_out(config: TunedConfig) -> tuple[str, ...]:
+    """What of a config is not drawn outside the runtime, a sentence each."""
+    sentences = []
+    if config.parameters.screen_space_strength > 0.0 and not _vpls_are_cells(config):
+        sentences.append("The screen-space near field is drawn by the runtime alone")
+    return tuple(sentences)
+
+
+def write_bundle(folder: Path, bundle: SceneBundle) -> None:
+    """Write `bundle.json` and `bundle.bin` into `folder`, each whole or not at all, the document last.
+
+    Raises:
+        InputError: the folder cannot be written to.
+    """
+    with written_whole(folder / BINARY_NAME) as temporary:
+        temporary.write_bytes(bundle.binary)
+    with written_whole(folder / DOCUMENT_NAME) as temporary:
+        temporary.write_text(json.dumps(bundle.document, indent=1, allow_nan=False) + "\n", encoding="ascii")
+
+
+class _Binary:
+    """Arrays one after another, each at a multiple of four bytes."""
+
+    def __init__(self) -> None:
+        self.content = bytearray()
+        self.arrays: dict[str, dict[str, Any]] = {}
+
+    def add_array(self, name: str, values: np.ndarray) -> None:
+        plain = np.ascontiguousarray(values, np.dtype(values.dtype).newbyteorder("<"))
+        self.arrays[name] = {
+            "type": values.dtype.name,
+            "shape": list(values.shape),
+            **self.add(plain.tobytes()),
+        }
+
+    def add(self, content: bytes) -> dict[str, int]:
+        self.content.extend(bytes(-len(self.content) % 4))
+        place = {"offset": len(self.content), "bytes": len(content)}
+        self.content.extend(content)
+        return place
+
+
+def _draws(scene: Scene, binary: _Binary) -> list[dict[str, Any]]:
+    """All triangles in world space, those of one texture together; a draw is a run of them."""
+    white = len(scene.textures)
+    textures = [scene.materials[scene.meshes[i.mesh].material].texture for i in scene.instances]
+    textures = [white if texture is None else texture for texture in textures]
+    order = sorted(range(len(textures)), key=lambda i: textures[i])
+    parts: dict[str, list[np.ndarray]] = {name: [] for name in ("positions", "normals", "uv", "base_colors")}
+    triangles, draws, first_vertex, first_triangle = [], [], 0, 0
+    for index in order:
+        instance = scene.instances[index]
+        mesh = scene.meshes[instance.mesh]
+        parts["positions"].append(transform_points(instance.to_world, mesh.positions))
+        parts["normals"].append(transform_normals(instance.to_world, mesh.normals))
+        parts["uv"].append(mesh.uv)
+        parts["base_colors"].append(mesh.colors * scene.materials[mesh.material].base_color)
+        triangles.append(mesh.triangles + first_vertex)
+        first_vertex += len(mesh.positions)
+        if not draws or draws[-1]["texture"] != textures[index]:
+            draws.append({"texture": textures[index], "first": first_triangle, "count": 0})
+        draws[-1]["count"] += len(mesh.triangles)
+        first_triangle += len(mesh.triangles)
+    for name, arrays in parts.items():
+        binary.add_array(name, np.concatenate(arrays).astype(np.float32))
+    binary.add_array("triangles", np.concatenate(triangles).astype(np.uint32))
+    return draws
+
+
+def _add_light_records(view: View, records: LightRecords, resolution: int, binary: _Binary) -> None:
+    """Lights and faces once more, as rows that a shader storage buffer takes as they are.
+
+    A light: position, kind (0 spot, 1 point, 2 directional); direction, 1/(cos inner − cos outer); intensity,
+    cos outer. A face: world to face, column by column; extent, number of its light, 1 where orthographic;
+    column and row of its tile in the atlas, near plane or range, 0.
+    """
+    lights = np.concatenate(
+        [records.lights[name] for name in ("position_kind", "direction_cone_scale", "intensity_cos_outer")],
+        axis=1,
+    )
+    binary.add_array("lights", lights.reshape(len(view.lights), 3, 4))
+    faces = np.zeros((len(records.faces), 6, 4), np.float32)
+    for row, face, place in zip(faces, records.faces, _faces(records, resolution), strict=True):
+        # Transposed twice: the record has the matrix column by column, and its inverse must be so too.
+        row[:4] = np.linalg.inv(face["light_to_world"].astype(np.float64))
+        row[4] = *face["extent"], face["light"], face["orthographic"]
+        row[5] = *reversed(place["origin"]), face["near_or_range"], 0.0
+    binary.add_array("faces", faces)
+
+
+def _texture(texture: Texture, binary: _Binary) -> dict[str, Any]:
+    """Texels as red, green and blue bytes, sRGB-encoded, top row first; their v counts from there."""
+    height, width, _ = texture.texels_srgb.shape
+    wraps = (texture.wrap_u, texture.wrap_v)
+    return {
+        "name": texture.name,
+        "size": [width, height],
+        "repeat": [wrap == "repeat" for wrap in wraps],
+        "mirrored": [int(wrap == "mirrored_repeat") for wrap in wraps],
+        **binary.add(np.ascontiguousarray(texture.texels_srgb).tobytes()),
+    }
+
+
+def _atlas(records: LightRecords) -> tuple[int, int]:
+    """Columns and rows of tiles."""
+    columns = max(1, min(len(records.faces), MAX_ATLAS_COLUMNS))
+    return columns, max(1, -(-len(records.faces) // columns))
+
+
+def _faces(records: LightRecords, resolution: int) -> list[dict[str, Any]]:
+    columns, _ = _atlas(records)
+    return [
+        {
+            "light": int(face["light"]),
+            # GLSL's matrices are stored column by column.
+            "light_to_world": face["light_to_world"].T.tolist(),
+            "extent": face["extent"].tolist(),
+            "near_or_range": float(face["near_or_range"]),
+            "orthographic": bool(face["orthographic"]),
+            "origin": [index // columns * resolution, index % columns * resolution],
+        }
+        for index, face in enumerate(records.faces)
+    ]

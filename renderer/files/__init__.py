@@ -1,0 +1,1 @@
+"""Files: whole-or-nothing writes, images, video, strict JSON."""

@@ -1,0 +1,90 @@
+"""Clips on disk: an H.264 .mp4, or a folder of numbered .png files."""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+from jaxtyping import UInt8
+
+from vpltune.renderer.errors import InputError, MachineError
+from vpltune.renderer.files.atomic_file import written_whole
+from vpltune.renderer.files.image_file import write_png
+
+QUALITY = 8
+"""Of imageio-ffmpeg's 0 to 10: next to no visible loss."""
+
+Picture = UInt8[np.ndarray, "height width 3"]
+
+
+def check_clip_path(path: Path, size: tuple[int, int]) -> None:
+    """Refuse what cannot be a clip of `size` = (width, height), before any of it is drawn.
+
+    Raises:
+        InputError: neither an .mp4 nor a folder, a file where the folder should be, or an odd size for an
+            .mp4, whose colours have half the resolution.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".mp4":
+        if size[0] % 2 or size[1] % 2:
+            raise InputError(f"{path}: an .mp4 must have even sides, got {size[0]}x{size[1]}")
+    elif suffix:
+        raise InputError(f"{path}: a clip must be an .mp4 or a folder for .png files, got {suffix!r}")
+    elif path.exists() and not path.is_dir():
+        raise InputError(f"{path}: must be a folder for .png files, and is a file")
+
+
+@contextlib.contextmanager
+def clip_writer(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Picture], None]]:
+    """Yield a function that takes the frames one by one; none is kept.
+
+    An .mp4 appears when the block ends well, whole or not at all. In a folder, each frame is whole, and
+    those written before an interrupt stay; frames of the same number are written anew.
+
+    Raises:
+        InputError: see `check_clip_path`, or the place cannot be written to.
+        MachineError: the encoder fails.
+    """
+    check_clip_path(path, size)
+    if path.suffix.lower() == ".mp4":
+        with written_whole(path) as temporary, _encoder(temporary, size, fps) as write:
+            yield write
+        return
+    count = 0
+
+    def write_numbered(picture: Picture) -> None:
+        nonlocal count
+        write_png(path / f"frame_{count:05d}.png", picture)
+        count += 1
+
+    yield write_numbered
+
+
+@contextlib.contextmanager
+def _encoder(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Picture], None]]:
+    encoder = imageio_ffmpeg.write_frames(
+        str(path),
+        size,
+        fps=fps,
+        codec="libx264",
+        quality=QUALITY,
+        # Two divides every even size; the library's 16 would stretch the picture.
+        macro_block_size=2,
+        output_params=["-movflags", "+faststart"],
+        ffmpeg_log_level="error",
+    )
+    encoder.send(None)
+
+    def write(picture: Picture) -> None:
+        try:
+            encoder.send(np.ascontiguousarray(picture))
+        except OSError as error:
+            raise MachineError(
+                f"{path.name}: the video encoder failed ({str(error).splitlines()[0]})"
+            ) from error
+
+    try:
+        yield write
+    finally:
+        encoder.close()

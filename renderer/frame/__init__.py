@@ -1,0 +1,1 @@
+"""One frame: its passes, and the runtime that draws with them."""

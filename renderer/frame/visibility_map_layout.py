@@ -1,0 +1,58 @@
+"""How VPL visibility maps are laid out: what the passes that cast them and those that read them agree on."""
+
+from dataclasses import dataclass
+
+from vpltune.renderer.frame.runtime_options import RuntimeOptions
+
+TEXEL_BYTES = 8
+"""A distance and a packed normal, or the place of finer texels: shaders/common/vpl_visibility.glsl."""
+VISIBILITY_LIFT = 0.01
+VISIBILITY_LEAST_LIFT = 1e-3
+"""Rays start, and distances count, from a point lifted off the VPL's surface: by so many footprints, and by
+this share of L at least. What an RSM holds lies off its surface by as much as interpolated depth rounds, some
+1e-4 of L, and a VPL behind its own surface would see nothing else."""
+FRAME_TURNS_OVER = -0.5
+"""Of a normal's z: where the tangents of a map turn over. Not at 0, where walls have their normals, and where
+rounding would decide."""
+_LARGEST_SHARE = 0.4
+"""Of the texels, how many may be cast finer. 3 to 12 % are at a silhouette in rooms, 28 % in the busiest of
+sixteen scenes. Where there is no room left texels stay coarse: which ones, may differ from frame to frame."""
+_MOST_DETAIL_BYTES = 1 << 27
+"""What every driver takes in one storage buffer: with blocks of 4², some 18,000 default maps of a room."""
+
+
+@dataclass(frozen=True)
+class VisibilityMapLayout:
+    """Texels along the side of a map, and of the block that stands for one of them at a silhouette.
+
+    A `size` of 0 is no map at all; a `refinement` of 1 is texels of one size everywhere.
+    """
+
+    size: int
+    refinement: int
+
+    @classmethod
+    def of(cls, options: RuntimeOptions) -> "VisibilityMapLayout":
+        """That of a runtime whose config asks for maps."""
+        return cls(options.visibility_map_size, options.visibility_map_refinement)
+
+    @property
+    def defines(self) -> dict[str, int | float]:
+        """What a shader that includes `common/vpl_visibility.glsl` is compiled with."""
+        return {
+            "VISIBILITY_MAP_SIZE": self.size,
+            "VISIBILITY_MAP_REFINEMENT": self.refinement,
+            "VISIBILITY_LIFT": VISIBILITY_LIFT,
+            "VISIBILITY_LEAST_LIFT": VISIBILITY_LEAST_LIFT,
+            "FRAME_TURNS_OVER": FRAME_TURNS_OVER,
+        }
+
+    def blocks(self, vpl_count: int) -> int:
+        """Blocks of finer texels that there is room for."""
+        if self.refinement == 1:
+            return 0
+        most = _MOST_DETAIL_BYTES // (self.refinement**2 * TEXEL_BYTES)
+        return min(int(_LARGEST_SHARE * vpl_count * self.size**2), most)
+
+
+NO_MAPS = VisibilityMapLayout(0, 1)

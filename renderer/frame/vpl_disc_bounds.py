@@ -1,0 +1,16 @@
+"""Bounds of a disc of light, for `shaders/common/vpl_disc.glsl` and its twin `tuner.surrogate.vpl_disc`."""
+
+LEAST_PART = 1e-4
+"""Of a disc's area over a receiver's horizon, below which it gives nothing: the share has two digits left."""
+LEAST_RADIUS = 1e-6
+"""In L: dark VPLs have no footprint."""
+FADE_HEIGHT = 1e-3
+"""In L: where a disc's light begins to fade towards its own plane, to be gone at half of that. So near, an
+RSM's depth does not tell which side of a surface a receiver is on, and the underside of a box on the floor
+would get all of the floor's radiosity."""
+
+DEFINES = {
+    "DISC_LEAST_PART": LEAST_PART,
+    "DISC_LEAST_RADIUS": LEAST_RADIUS,
+    "DISC_FADE_HEIGHT": FADE_HEIGHT,
+}

@@ -1,0 +1,1 @@
+"""OpenGL: context, shaders, scene buffers, render targets, rays."""

@@ -1,0 +1,219 @@
+"""A scene on the GPU: one vertex buffer, one index buffer, one indirect draw for each texture."""
+
+import math
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from jaxtyping import Float64
+
+from vpltune.renderer.gpu import buffer_bindings
+from vpltune.renderer.gpu.gpu_context import GL_SRGB8, check_errors
+from vpltune.renderer.scene.animation import AnimationPlayer
+from vpltune.renderer.scene.placed_boxes import placed_boxes
+from vpltune.renderer.scene.scene import Mesh, Scene, Texture
+
+_VERTEX_LAYOUT = "3f 3f 2f 3f"
+_VERTEX_ATTRIBUTES = ("in_position", "in_normal", "in_uv", "in_color")
+_INSTANCE_DTYPE = np.dtype(
+    [
+        ("to_world", "f4", (4, 4)),
+        ("normal_to_world", "f4", (4, 4)),
+        ("base_color", "f4", 4),
+        ("skinning", "i4", 4),
+    ]
+)
+_INFLUENCE_DTYPE = np.dtype([("joint", "i4"), ("weight", "f4")])
+_COMMAND_DTYPE = np.dtype(
+    [("count", "u4"), ("instances", "u4"), ("first", "u4"), ("base_vertex", "i4"), ("base_instance", "u4")]
+)
+_MAX_ANISOTROPY = 8.0
+
+
+@dataclass(frozen=True)
+class DrawGroup:
+    """A run of indirect draw commands that share one texture."""
+
+    texture: moderngl.Texture
+    mirrored: tuple[int, int]
+    first: int
+    count: int
+
+
+class SceneBuffers:
+    """Vertex, index, instance and command buffers of one scene, and its textures.
+
+    Where things stand may change between frames (`set_pose`); nothing is precomputed from it but the
+    bounds.
+    """
+
+    def __init__(self, context: moderngl.Context, scene: Scene):
+        self._context = context
+        self._scene = scene
+        self._boxes = placed_boxes(scene)
+        self._vertices = context.buffer(
+            np.concatenate([_interleaved(mesh) for mesh in scene.meshes]).tobytes()
+        )
+        self._indices = context.buffer(
+            np.concatenate([mesh.triangles.ravel() for mesh in scene.meshes]).astype("u4").tobytes()
+        )
+        self._make_skinning()
+        self._records = self._instance_records()
+        self._instances = context.buffer(reserve=self._records.nbytes)
+        self._textures = [_upload_texture(context, texture) for texture in scene.textures]
+        self._white = context.texture((1, 1), 3, b"\xff\xff\xff")
+        self.draw_groups = self._make_commands()
+        # gl_InstanceID ignores the base instance; a per-instance attribute does not.
+        self._instance_numbers = context.buffer(np.arange(len(scene.instances), dtype="i4").tobytes())
+        rest = AnimationPlayer(scene).rest_pose()
+        self.set_pose(rest.transforms, rest.joint_matrices)
+        self.rest_bounds = self._bounds
+        """As `bounds`, of the scene at rest."""
+        check_errors(context, f"the buffers of scene {scene.name}")
+
+    def vertex_array(self, program: moderngl.Program) -> moderngl.VertexArray:
+        """The scene's vertices bound to a program's inputs; inputs that it does not use are skipped."""
+        attributes = [name if name in program else None for name in _VERTEX_ATTRIBUTES]
+        layout = " ".join(
+            part if name else f"{_bytes(part)}x"
+            for part, name in zip(_VERTEX_LAYOUT.split(), attributes, strict=True)
+        )
+        content = [
+            (self._vertices, layout, *(name for name in attributes if name)),
+            (self._instance_numbers, "1i /i", "in_instance"),
+        ]
+        return self._context.vertex_array(program, content, index_buffer=self._indices, index_element_size=4)
+
+    def draw(self, vertex_array: moderngl.VertexArray, texture_unit: int = 0) -> None:
+        """Draw every instance: one multi-draw for each texture."""
+        self._instances.bind_to_storage_buffer(buffer_bindings.SCENE_INSTANCES)
+        self._influences.bind_to_storage_buffer(buffer_bindings.SKIN_INFLUENCES)
+        self._joints.bind_to_storage_buffer(buffer_bindings.JOINT_MATRICES)
+        program = vertex_array.program
+        for group in self.draw_groups:
+            group.texture.use(texture_unit)
+            if "mirrored" in program:
+                program["mirrored"] = group.mirrored
+            vertex_array.render_indirect(self._commands, moderngl.TRIANGLES, group.count, group.first)
+
+    def set_pose(
+        self,
+        transforms: Float64[np.ndarray, "instances 4 4"],
+        joint_matrices: Float64[np.ndarray, "joints 4 4"],
+    ) -> None:
+        """Move everything; takes effect with the next frame. One write for each of the two buffers.
+
+        Args:
+            transforms: to world, of all instances; those that joints place do not use theirs.
+            joint_matrices: of all skins, one after the other.
+        """
+        self._bounds = self._boxes.bounds(transforms, joint_matrices)
+        self.transforms, self.joint_matrices = transforms, joint_matrices
+        # GLSL matrices are stored column by column.
+        self._records["to_world"] = transforms.transpose(0, 2, 1)
+        self._records["normal_to_world"][:, :3, :3] = _normal_matrices(transforms).transpose(0, 2, 1)
+        self._instances.write(self._records)
+        if len(joint_matrices):
+            self._joints.write(np.ascontiguousarray(joint_matrices.transpose(0, 2, 1), np.float32))
+
+    def bounds(self) -> Float64[np.ndarray, "2 3"]:
+        """Low and high corner of a box around all instances as they stand, world units."""
+        return self._bounds
+
+    def _make_commands(self) -> list[DrawGroup]:
+        scene = self._scene
+        vertex_starts = np.cumsum([0] + [len(mesh.positions) for mesh in scene.meshes])
+        index_starts = np.cumsum([0] + [mesh.triangles.size for mesh in scene.meshes])
+        texture_of = [scene.materials[scene.meshes[i.mesh].material].texture for i in scene.instances]
+        order = sorted(
+            range(len(scene.instances)), key=lambda i: -1 if texture_of[i] is None else texture_of[i]
+        )
+        commands = np.zeros(len(order), _COMMAND_DTYPE)
+        groups: list[DrawGroup] = []
+        for position, i in enumerate(order):
+            mesh = scene.instances[i].mesh
+            commands[position] = (
+                scene.meshes[mesh].triangles.size, 1, index_starts[mesh], vertex_starts[mesh], i
+            )  # fmt: skip
+            if position == 0 or texture_of[i] != texture_of[order[position - 1]]:
+                groups.append(self._group(texture_of[i], position, order, texture_of))
+        self._commands = self._context.buffer(commands.tobytes())
+        return groups
+
+    def _group(
+        self, texture: int | None, first: int, order: list[int], texture_of: list[int | None]
+    ) -> DrawGroup:
+        count = sum(texture_of[i] == texture for i in order)
+        if texture is None:
+            return DrawGroup(self._white, (0, 0), first, count)
+        source = self._scene.textures[texture]
+        mirrored = (int(source.wrap_u == "mirrored_repeat"), int(source.wrap_v == "mirrored_repeat"))
+        return DrawGroup(self._textures[texture], mirrored, first, count)
+
+    def _instance_records(self) -> np.ndarray:
+        """Everything about instances but where they are."""
+        scene = self._scene
+        records = np.zeros(len(scene.instances), _INSTANCE_DTYPE)
+        vertex_starts = np.cumsum([0] + [len(mesh.positions) for mesh in scene.meshes])
+        for index, instance in enumerate(scene.instances):
+            mesh = scene.meshes[instance.mesh]
+            records["base_color"][index, :3] = scene.materials[mesh.material].base_color
+            if mesh.skinning is not None:
+                records["skinning"][index] = (
+                    self._first_influences[instance.mesh],
+                    vertex_starts[instance.mesh],
+                    mesh.skinning.joints.shape[1],
+                    self._first_joints[scene.animation.instance_skins[index]],
+                )
+        return records
+
+    def _make_skinning(self) -> None:
+        """The influences of all skinned vertices, mesh after mesh, and room for all joints."""
+        scene = self._scene
+        skins = () if scene.animation is None else scene.animation.skins
+        self._first_joints = np.cumsum([0] + [len(skin.joints) for skin in skins])
+        bent = [mesh.skinning for mesh in scene.meshes]
+        counts = [0 if skinning is None else skinning.joints.size for skinning in bent]
+        self._first_influences = np.cumsum([0, *counts])
+        # OpenGL buffers cannot be empty.
+        influences = np.zeros(max(1, sum(counts)), _INFLUENCE_DTYPE)
+        for start, count, skinning in zip(self._first_influences, counts, bent, strict=False):
+            if skinning is not None:
+                influences["joint"][start : start + count] = skinning.joints.ravel()
+                influences["weight"][start : start + count] = skinning.weights.ravel()
+        self._influences = self._context.buffer(influences)
+        self._joints = self._context.buffer(reserve=64 * max(1, int(self._first_joints[-1])))
+
+
+def _normal_matrices(transforms: Float64[np.ndarray, "n 4 4"]) -> Float64[np.ndarray, "n 3 3"]:
+    """Cofactors of the linear parts, at a size that float32 can hold: normals need only the direction."""
+    linear = transforms[:, :3, :3]
+    cofactors = np.stack([np.cross(linear[:, (i + 1) % 3], linear[:, (i + 2) % 3]) for i in range(3)], axis=1)
+    size = np.abs(cofactors).max(axis=(1, 2), keepdims=True)
+    return np.divide(cofactors, size, out=np.zeros_like(cofactors), where=size > 0.0)
+
+
+def _bytes(part: str) -> int:
+    return int(part[:-1]) * 4
+
+
+def _interleaved(mesh: Mesh) -> np.ndarray:
+    positions, normals = mesh.positions, mesh.normals
+    if mesh.skinning is not None:
+        positions, normals = mesh.skinning.bind_positions, mesh.skinning.bind_normals
+    return np.ascontiguousarray(
+        np.concatenate([positions, normals, mesh.uv, mesh.colors], axis=1), np.float32
+    )
+
+
+def _upload_texture(context: moderngl.Context, texture: Texture) -> moderngl.Texture:
+    height, width, _ = texture.texels_srgb.shape
+    # Row 0 of the upload is v = 0, and glTF's v = 0 is the top row: no flip.
+    data = np.ascontiguousarray(texture.texels_srgb).tobytes()
+    uploaded = context.texture((width, height), 3, data, alignment=1, internal_format=GL_SRGB8)
+    uploaded.build_mipmaps(0, max(0, math.floor(math.log2(max(width, height)))))
+    uploaded.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    uploaded.anisotropy = _MAX_ANISOTROPY
+    uploaded.repeat_x = texture.wrap_u == "repeat"
+    uploaded.repeat_y = texture.wrap_v == "repeat"
+    return uploaded

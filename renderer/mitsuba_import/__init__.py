@@ -1,3 +1,0 @@
-"""Mitsuba scenes brought to our own description, without Mitsuba."""
-
-from renderer.mitsuba_import.mitsuba_scene import read_mitsuba as read_mitsuba

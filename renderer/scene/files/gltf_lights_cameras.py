@@ -1,0 +1,106 @@
+"""glTF cameras and KHR_lights_punctual lights, placed in the world."""
+
+import math
+
+import numpy as np
+from jaxtyping import Float64
+
+from vpltune.renderer.scene.files.diagnostics import SceneFileError, label
+from vpltune.renderer.scene.files.gltf_document import GltfDocument
+from vpltune.renderer.scene.files.json_object import JsonObject
+from vpltune.renderer.scene.files.limits import LARGEST_RADIOMETRIC
+from vpltune.renderer.scene.scene import Camera, Light, without_scale
+
+
+def read_camera(
+    camera: JsonObject, to_world: Float64[np.ndarray, "4 4"], document: GltfDocument
+) -> Camera | None:
+    """The camera of a node; None for an orthographic one. The picture's size decides the aspect ratio.
+
+    Raises:
+        SceneFileError: a value is missing or out of range, or the node's scale leaves no direction.
+    """
+    kind = camera.string("type")
+    if kind == "orthographic":
+        document.warnings.tally(
+            "1 orthographic camera is ignored; only perspective ones are used",
+            "{n} orthographic cameras are ignored; only perspective ones are used",
+        )
+        return None
+    if kind != "perspective":
+        raise SceneFileError(
+            f"{camera.at('type')}: must be 'perspective' or 'orthographic', got {kind!r:.40}"
+        )
+    perspective = camera.required_object("perspective")
+    yfov = perspective.number("yfov", low=0.0, high=math.pi)
+    if not 0.0 < yfov < math.pi:
+        raise SceneFileError(f"{perspective.at('yfov')}: must lie in (0, π) radians, got {yfov:g}")
+    rigid = without_scale(to_world)
+    if rigid is None:
+        raise SceneFileError(f"{camera.where}: its node is scaled to nothing, which leaves it no direction")
+    return Camera(rigid, yfov)
+
+
+def read_light(
+    light: JsonObject, to_world: Float64[np.ndarray, "4 4"], document: GltfDocument
+) -> Light | None:
+    """A punctual light at a node: it shines along the node's −Z; the node's scale changes no intensity.
+
+    Returns:
+        None for a light of no intensity.
+
+    Raises:
+        SceneFileError: a value is missing or out of range, or the node's scale leaves no direction.
+    """
+    kind = light.string("type")
+    if kind not in ("point", "spot", "directional"):
+        raise SceneFileError(
+            f"{light.at('type')}: must be 'point', 'spot' or 'directional', got {kind!r:.40}"
+        )
+    color = light.numbers("color", 3, default=(1.0, 1.0, 1.0))
+    if (color < 0.0).any():
+        raise SceneFileError(f"{light.at('color')}: must not be negative, got {color.tolist()}")
+    strength = light.number("intensity", 1.0, low=0.0, high=LARGEST_RADIOMETRIC)
+    inner, outer = _cone(light) if kind == "spot" else (0.0, math.pi / 4)
+    if kind != "directional" and "range" in light.members:
+        light.number("range")
+        document.warnings.add("a light's range is ignored: light falls off as 1/d² without end")
+    intensity = strength * color
+    if intensity.max() > LARGEST_RADIOMETRIC:
+        raise SceneFileError(f"{light.where}: color times intensity must be at most {LARGEST_RADIOMETRIC:g}")
+    if not intensity.any():
+        document.warnings.tally(
+            "1 light has no intensity; it is left out", "{n} lights have no intensity; they are left out"
+        )
+        return None
+    return Light(
+        kind=kind,
+        intensity=intensity,
+        position_world=to_world[:3, 3].copy(),
+        direction_world=np.array([0.0, 0.0, -1.0])
+        if kind == "point"
+        else -_unit(to_world[:3, 2], light.where),
+        inner_cone=inner,
+        outer_cone=outer,
+        name=label(light.string("name", ""), light.where),
+    )
+
+
+def _cone(light: JsonObject) -> tuple[float, float]:
+    spot = light.object("spot") or JsonObject({}, light.at("spot"))
+    inner = spot.number("innerConeAngle", 0.0)
+    outer = spot.number("outerConeAngle", math.pi / 4)
+    # 1e-6: π/2 written by a float32 exporter.
+    if not 0.0 <= inner < outer <= math.pi / 2 + 1e-6:
+        raise SceneFileError(
+            f"{spot.where}: cone angles must satisfy 0 ≤ innerConeAngle < outerConeAngle ≤ π/2, "
+            f"got {inner:g} and {outer:g}"
+        )
+    return inner, min(outer, math.pi / 2)
+
+
+def _unit(vector: Float64[np.ndarray, "3"], where: str) -> Float64[np.ndarray, "3"]:
+    length = np.linalg.norm(vector)
+    if not length > 0.0:
+        raise SceneFileError(f"{where}: its node is scaled to nothing, which leaves it no direction")
+    return vector / length

@@ -1,0 +1,141 @@
+"""The glTF node hierarchy: which nodes the active scene shows, and where each stands in the world."""
+
+import numpy as np
+from jaxtyping import Float64
+
+from vpltune.renderer.scene.files.diagnostics import SceneFileError
+from vpltune.renderer.scene.files.gltf_document import GltfDocument
+from vpltune.renderer.scene.files.json_object import JsonObject
+from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, MAX_NODES
+from vpltune.renderer.scene.scene import trs_matrices
+
+
+class GltfNodes:
+    """The nodes of one document, checked to be a forest."""
+
+    def __init__(self, document: GltfDocument) -> None:
+        count = len(document.root.members.get("nodes", ()))
+        if count > MAX_NODES:
+            raise SceneFileError(f"nodes: must be at most {MAX_NODES:,}, got {count:,}")
+        self._document = document
+        self.nodes = document.list_of("nodes")
+        self.children = [node.indices("children", count, "nodes") for node in self.nodes]
+        self.parents = self._checked_parents()
+        self._world: dict[int, Float64[np.ndarray, "4 4"]] = {}
+
+    def shown(self) -> list[int]:
+        """The nodes of the active scene, parents before children, without those marked invisible.
+
+        Raises:
+            SceneFileError: the scene names a node twice, one out of range, or one that has a parent.
+        """
+        pending = self._roots()[::-1]
+        order = []
+        while pending:
+            index = pending.pop()
+            visibility = self.nodes[index].extension("KHR_node_visibility")
+            if visibility is None or visibility.boolean("visible", True):
+                order.append(index)
+                pending.extend(self.children[index][::-1])
+        return order
+
+    def to_world(self, index: int) -> Float64[np.ndarray, "4 4"]:
+        """Local to world, composed in double precision along the chain of parents, however long.
+
+        Raises:
+            SceneFileError: a transform is malformed, or the product leaves the range of coordinates.
+        """
+        chain = []
+        at = index
+        while at >= 0 and at not in self._world:
+            chain.append(at)
+            at = self.parents[at]
+        matrix = self._world[at] if at >= 0 else np.eye(4)
+        for at in reversed(chain):
+            local = local_matrix(self.nodes[at], self._document)
+            if local is not None:
+                matrix = matrix @ local
+                if not np.abs(matrix).max() <= LARGEST_COORDINATE:
+                    raise SceneFileError(
+                        f"{self.nodes[at].where}: its transform to the world must stay within "
+                        f"{LARGEST_COORDINATE:g}"
+                    )
+            self._world[at] = matrix
+        return matrix
+
+    def _roots(self) -> list[int]:
+        scenes = self._document.list_of("scenes")
+        if not scenes:
+            roots = [index for index, parent in enumerate(self.parents) if parent < 0]
+            if roots:
+                self._document.warnings.add("the file has no scene: all of its nodes are shown")
+            return roots
+        scene = self._document.referred(self._document.root, "scene", "scenes")
+        if scene is None:
+            scene = scenes[0]
+            if len(scenes) > 1:
+                self._document.warnings.add(
+                    f"the file names none of its {len(scenes)} scenes: the first is read"
+                )
+        roots = scene.indices("nodes", len(self.nodes), "nodes")
+        for root in roots:
+            if self.parents[root] >= 0:
+                raise SceneFileError(
+                    f"{scene.at('nodes')}: must be root nodes, got {root}, a child of another"
+                )
+        if len(set(roots)) != len(roots):
+            raise SceneFileError(f"{scene.at('nodes')}: names a node twice")
+        return roots
+
+    def _checked_parents(self) -> list[int]:
+        parents = [-1] * len(self.nodes)
+        for index, children in enumerate(self.children):
+            for child in children:
+                if parents[child] >= 0:
+                    raise SceneFileError(
+                        f"nodes[{child}]: must have one parent, got {parents[child]} and {index}"
+                    )
+                parents[child] = index
+        # With one parent at most, what no root leads to goes round in a circle.
+        reached = [index for index, parent in enumerate(parents) if parent < 0]
+        for index in reached:  # grows as it is read
+            reached.extend(self.children[index])
+        if len(reached) < len(parents):
+            lost = min(set(range(len(parents))) - set(reached))
+            raise SceneFileError(f"nodes[{lost}]: is its own ancestor")
+        return parents
+
+
+def local_matrix(node: JsonObject, document: GltfDocument) -> Float64[np.ndarray, "4 4"] | None:
+    """A node's matrix, or its translation · rotation · scale; None where it has none.
+
+    Raises:
+        SceneFileError: not affine, both given at once, or a rotation that is none.
+    """
+    parts = [key for key in ("translation", "rotation", "scale") if key in node.members]
+    if "matrix" in node.members:
+        if parts:
+            raise SceneFileError(f"{node.where}: must not have both matrix and {parts[0]}")
+        matrix = node.numbers("matrix", 16).reshape(4, 4).T  # stored column by column
+        if (matrix[3] != (0.0, 0.0, 0.0, 1.0)).any():
+            raise SceneFileError(
+                f"{node.at('matrix')}: its last row must be 0 0 0 1, got {matrix[3].tolist()}"
+            )
+        return matrix
+    if not parts:
+        return None
+    rotation = node.numbers("rotation", 4, default=(0.0, 0.0, 0.0, 1.0))
+    length = np.linalg.norm(rotation)
+    if not length > 0.0:
+        raise SceneFileError(f"{node.at('rotation')}: must be a unit quaternion, got zero")
+    # 1e-3: quaternions printed with four digits pass in silence.
+    if abs(length - 1.0) > 1e-3:
+        document.warnings.tally(
+            "1 node has a rotation that is no unit quaternion; it is normalised",
+            "{n} nodes have rotations that are no unit quaternions; they are normalised",
+        )
+    return trs_matrices(
+        node.numbers("translation", 3, default=(0.0, 0.0, 0.0))[None],
+        rotation[None],
+        node.numbers("scale", 3, default=(1.0, 1.0, 1.0))[None],
+    )[0]

@@ -1,0 +1,168 @@
+"""A glTF document made into a scene: meshes, lights and cameras placed by the active scene's nodes."""
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float64
+
+from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, label
+from vpltune.renderer.scene.files.gltf_accessors import GltfAccessors
+from vpltune.renderer.scene.files.gltf_animations import Placed, moving_nodes, placed_animation, read_channels
+from vpltune.renderer.scene.files.gltf_deformation import Deformation, read_deformation, read_skin
+from vpltune.renderer.scene.files.gltf_document import GltfDocument, open_gltf
+from vpltune.renderer.scene.files.gltf_lights_cameras import read_camera, read_light
+from vpltune.renderer.scene.files.gltf_materials import GltfMaterials
+from vpltune.renderer.scene.files.gltf_nodes import GltfNodes
+from vpltune.renderer.scene.files.gltf_primitives import GltfPrimitives
+from vpltune.renderer.scene.files.json_object import JsonObject
+from vpltune.renderer.scene.files.limits import MAX_INSTANCES
+from vpltune.renderer.scene.scene import Camera, Instance, Light, Mesh, Scene, trs_matrices
+
+
+def read_gltf(path: Path, warnings: Warnings) -> Scene:
+    """Read a .gltf or .glb file.
+
+    Raises:
+        SceneFileError: the file breaks a rule of glTF 2.0 that its picture depends on, or a limit of ours.
+    """
+    document = open_gltf(path, warnings)
+    builder = _SceneBuilder(document)
+    for index in builder.nodes.shown():
+        builder.add_node(index)
+    return Scene(
+        name=label(path.stem, "scene"),
+        meshes=tuple(builder.meshes),
+        instances=tuple(builder.instances),
+        materials=tuple(builder.materials.materials),
+        textures=tuple(builder.materials.textures),
+        lights=tuple(builder.lights),
+        cameras=tuple(builder.cameras),
+        animation=placed_animation(builder.channels, builder.placed, builder.nodes),
+        warnings=warnings.lines(),
+    )
+
+
+class _SceneBuilder:
+    def __init__(self, document: GltfDocument) -> None:
+        self.document = document
+        self.nodes = GltfNodes(document)
+        self.accessors = GltfAccessors(document)
+        self.materials = GltfMaterials(document, self.accessors)
+        self.primitives = GltfPrimitives(document, self.accessors)
+        self.meshes: list[Mesh] = []
+        self.instances: list[Instance] = []
+        self.lights: list[Light] = []
+        self.cameras: list[Camera] = []
+        self.channels = read_channels(document, self.nodes, self.accessors)
+        self.placed = Placed()
+        self._skins: dict[str, int] = {}
+        self._moving_nodes = moving_nodes(self.channels, self.nodes)
+        self._meshes_at_rest: dict[tuple[str, str], int | None] = {}
+
+    def add_node(self, index: int) -> None:
+        node = self.nodes.nodes[index]
+        mesh = self.document.referred(node, "mesh", "meshes")
+        camera = self.document.referred(node, "camera", "cameras")
+        light = self._light_of(node)
+        if mesh is not None:
+            self._add_mesh(index, node, mesh)
+        if camera is not None:
+            filming = read_camera(camera, self.nodes.to_world(index), self.document)
+            if filming is not None:
+                self.cameras.append(filming)
+                self.placed.camera_nodes.append(index)
+        if light is not None:
+            shining = read_light(light, self.nodes.to_world(index), self.document)
+            if shining is not None:
+                self.lights.append(shining)
+                self.placed.light_nodes.append(index)
+
+    def _light_of(self, node: JsonObject) -> JsonObject | None:
+        reference = node.extension("KHR_lights_punctual")
+        if reference is None:
+            return None
+        extension = self.document.root.extension("KHR_lights_punctual")
+        lights = [] if extension is None else extension.objects("lights")
+        return lights[reference.required_index("light", len(lights), "lights")]
+
+    def _add_mesh(self, index: int, node: JsonObject, mesh: JsonObject) -> None:
+        deformation = read_deformation(
+            node, mesh, self.document, self.nodes, self.accessors, self._moving_nodes
+        )
+        # A skinned mesh stands where its joints are, whatever its own node's transform.
+        is_placed_by_joints = deformation.joint_to_world is not None
+        local = np.eye(4)[None] if is_placed_by_joints else self._placements(index, node)
+        to_world = local if is_placed_by_joints else self.nodes.to_world(index) @ local
+        name = label(node.string("name", ""), node.where)
+        primitives = [p for p in mesh.objects("primitives") if self.primitives.is_surface(p)]
+        if len(self.instances) + len(primitives) * len(to_world) > MAX_INSTANCES:
+            raise SceneFileError(f"nodes: must place at most {MAX_INSTANCES:,} primitives in all")
+        skin = self._skin_of(node) if deformation.is_animated else -1
+        for primitive in primitives:
+            at = self._mesh_at_rest(node, primitive, mesh, deformation)
+            if at is not None:
+                self.instances += [Instance(name, at, matrix) for matrix in to_world]
+                self.placed.instance_nodes += [-1 if is_placed_by_joints else index] * len(to_world)
+                self.placed.instance_local += list(local)
+                is_bent = self.meshes[at].skinning is not None
+                self.placed.instance_skins += [skin if is_bent else -1] * len(to_world)
+
+    def _skin_of(self, node: JsonObject) -> int:
+        skin = self.document.referred(node, "skin", "skins")
+        assert skin is not None
+        if skin.where not in self._skins:
+            self._skins[skin.where] = len(self.placed.skins)
+            self.placed.skins.append(read_skin(skin, self.nodes, self.accessors))
+        return self._skins[skin.where]
+
+    def _mesh_at_rest(
+        self, node: JsonObject, primitive: JsonObject, mesh: JsonObject, deformation: Deformation
+    ) -> int | None:
+        # Nodes share a mesh unless they bend it each in their own way.
+        is_own = deformation.joint_to_world is not None or "weights" in node.members
+        key = (primitive.where, node.where if is_own else "")
+        if key not in self._meshes_at_rest:
+            base_color = self.materials.of(primitive)
+            name = label(mesh.string("name", ""), mesh.where)
+            read = self.primitives.read(primitive, name, base_color, deformation)
+            self._meshes_at_rest[key] = None if read is None else len(self.meshes)
+            self.meshes += [] if read is None else [read]
+        return self._meshes_at_rest[key]
+
+    def _placements(self, index: int, node: JsonObject) -> Float64[np.ndarray, "placements 4 4"]:
+        """From each instance of EXT_mesh_gpu_instancing to the node, else the identity; no flattened ones."""
+        instancing = node.extension("EXT_mesh_gpu_instancing")
+        local = np.eye(4)[None] if instancing is None else self._instance_matrices(instancing)
+        # A surface needs two directions to have area; 1e-12 is far below float32's grain.
+        stretch = np.linalg.svd((self.nodes.to_world(index) @ local)[:, :3, :3], compute_uv=False)
+        is_surface = stretch[:, 1] > 1e-12 * stretch[:, 0]
+        for _ in range(int((~is_surface).sum())):
+            self.document.warnings.tally(
+                "1 node is scaled to a line or a point and draws nothing",
+                "{n} nodes are scaled to a line or a point and draw nothing",
+            )
+        return local[is_surface]
+
+    def _instance_matrices(self, instancing: JsonObject) -> Float64[np.ndarray, "instances 4 4"]:
+        attributes = instancing.required_object("attributes")
+        parts = {
+            key: self.accessors.referred(attributes, key, (kind,))
+            for key, kind in (("TRANSLATION", "VEC3"), ("ROTATION", "VEC4"), ("SCALE", "VEC3"))
+            if key in attributes.members
+        }
+        counts = {len(part) for part in parts.values()}
+        if len(counts) != 1 or max(counts) > MAX_INSTANCES:
+            raise SceneFileError(
+                f"{attributes.where}: TRANSLATION, ROTATION and SCALE must have one count of at most "
+                f"{MAX_INSTANCES:,}, got {sorted(counts)}"
+            )
+        count = counts.pop()
+        values = {key: part.as_floats().astype(np.float64) for key, part in parts.items()}
+        rotation = values.get("ROTATION", np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)))
+        if not np.linalg.norm(rotation, axis=1).all():
+            raise SceneFileError(f"{attributes.at('ROTATION')}: must be unit quaternions, got zero")
+        return trs_matrices(
+            values.get("TRANSLATION", np.zeros((count, 3))),
+            rotation,
+            values.get("SCALE", np.ones((count, 3))),
+        )

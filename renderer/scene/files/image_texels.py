@@ -1,0 +1,93 @@
+"""Images as sRGB-encoded texels: any PNG, JPEG or WebP brought to eight bits of red, green and blue."""
+
+import io
+import struct
+import warnings
+
+import numpy as np
+from jaxtyping import UInt8
+from PIL import Image
+
+from vpltune.renderer.scene.files.diagnostics import SceneFileError
+from vpltune.renderer.scene.files.limits import (
+    FREE_TEXELS,
+    MAX_IMAGE_SIDE,
+    MAX_IMAGE_TEXELS,
+    MAX_SCENE_TEXELS,
+    TEXELS_PER_BYTE,
+)
+
+GLTF_FORMATS = ("PNG", "JPEG", "WEBP")
+_STRIP_ROWS = 256
+MTL_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA")
+
+
+class ImageDecoder:
+    """Decodes the images of one scene, within its limit of texels."""
+
+    def __init__(self, formats: tuple[str, ...]) -> None:
+        self._formats = formats
+        self._texels = 0
+        self._bytes = 0
+
+    def decode(self, content: bytes, where: str) -> UInt8[np.ndarray, "height width 3"]:
+        """Texels, row 0 at the top; alpha, profiles, gamma and orientation are left aside, as glTF asks.
+
+        Raises:
+            SceneFileError: not an image of a known format, broken, cut off, or too large.
+        """
+        try:
+            # The header alone is read here, so that size is judged before anything is unpacked.
+            with warnings.catch_warnings():
+                # PIL says things of odd headers and large sizes; the size is judged here.
+                warnings.simplefilter("ignore")
+                with Image.open(io.BytesIO(content), formats=self._formats) as image:
+                    self._check_size(image.size, len(content), where)
+                    return _rgb(image)
+        except SceneFileError:
+            raise
+        except Image.DecompressionBombError as error:
+            raise SceneFileError(f"{where}: {error}") from error
+        except (OSError, SyntaxError, ValueError, EOFError, struct.error, IndexError) as error:
+            # PIL's own words for an unknown format print a memory address.
+            cause = (
+                f"is no {', '.join(self._formats)}"
+                if "cannot identify" in str(error)
+                else f"is broken ({error})"
+            )
+            raise SceneFileError(f"{where}: image {cause}") from error
+
+    def _check_size(self, size: tuple[int, int], encoded: int, where: str) -> None:
+        width, height = size
+        if max(size) > MAX_IMAGE_SIDE or width * height > MAX_IMAGE_TEXELS:
+            raise SceneFileError(
+                f"{where}: an image must be at most {MAX_IMAGE_SIDE} texels on a side and "
+                f"{MAX_IMAGE_TEXELS:,} in all, got {width} × {height}"
+            )
+        self._texels += width * height
+        self._bytes += encoded
+        most = min(FREE_TEXELS + TEXELS_PER_BYTE * self._bytes, MAX_SCENE_TEXELS)
+        if self._texels > most:
+            raise SceneFileError(
+                f"{where}: the images of this scene must have at most {most:,} texels together, and with "
+                f"this one of {width} × {height} they have {self._texels:,}"
+            )
+
+
+def _rgb(image: Image.Image) -> UInt8[np.ndarray, "height width 3"]:
+    width, height = image.size
+    texels = np.empty((height, width, 3), np.uint8)
+    # Strip by strip: whole, PIL's conversions would hold a large image three times over.
+    for top in range(0, height, _STRIP_ROWS):
+        strip = image.crop((0, top, width, min(top + _STRIP_ROWS, height)))
+        texels[top : top + _STRIP_ROWS] = _strip_rgb(strip)
+    return texels
+
+
+def _strip_rgb(strip: Image.Image) -> UInt8[np.ndarray, "height width _"]:
+    if strip.mode.startswith("I") or strip.mode == "F":
+        # Sixteen-bit grey. PIL's own conversion to eight bits clips where it should divide by 257.
+        return ((np.clip(np.asarray(strip), 0, 65535).astype(np.uint32) + 128) // 257).astype(np.uint8)[
+            :, :, None
+        ]
+    return np.asarray(strip.convert("RGB"))

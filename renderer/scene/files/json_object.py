@@ -1,0 +1,216 @@
+"""JSON as it comes from strangers: parsed strictly, and asked for typed values by key."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64
+
+from vpltune.renderer.scene.files.diagnostics import SceneFileError
+from vpltune.renderer.scene.files.limits import MAX_JSON_VALUES
+
+# Beyond this no number in a scene means anything, and sums and products in float64 stay finite.
+_LARGEST_NUMBER = 1e30
+
+
+@dataclass(frozen=True, slots=True)
+class JsonObject:
+    """One JSON object and its place in the document, such as `meshes[3].primitives[0]`.
+
+    Every getter raises SceneFileError, naming the place and the value, where the value has the wrong type
+    or lies outside the range asked for. An absent key gives the default, and raises where there is none.
+    """
+
+    members: dict[str, Any]
+    where: str
+
+    def at(self, key: str) -> str:
+        """The place of a member, for messages."""
+        return f"{self.where}.{key}" if self.where else key
+
+    def object(self, key: str) -> "JsonObject | None":
+        if key not in self.members:
+            return None
+        return _as_object(self.members[key], self.at(key))
+
+    def required_object(self, key: str) -> "JsonObject":
+        return _as_object(self._required(key), self.at(key))
+
+    def objects(self, key: str) -> list["JsonObject"]:
+        """The objects of a list; none where the key is absent."""
+        place = self.at(key)
+        return [_as_object(item, f"{place}[{i}]") for i, item in enumerate(self._list(key))]
+
+    def extension(self, name: str) -> "JsonObject | None":
+        extensions = self.object("extensions")
+        return None if extensions is None else extensions.object(name)
+
+    def string(self, key: str, default: str | None = None) -> str:
+        if key not in self.members and default is not None:
+            return default
+        value = self._required(key)
+        if not isinstance(value, str):
+            raise self._wrong(key, "a string", value)
+        return value
+
+    def strings(self, key: str) -> list[str]:
+        values = self._list(key)
+        for value in values:
+            if not isinstance(value, str):
+                raise self._wrong(key, "a list of strings", value)
+        return values
+
+    def boolean(self, key: str, default: bool) -> bool:
+        value = self.members.get(key, default)
+        if not isinstance(value, bool):
+            raise self._wrong(key, "true or false", value)
+        return value
+
+    def integer(self, key: str, default: int | None = None, low: int = 0, high: int | None = None) -> int:
+        value = default if key not in self.members and default is not None else self._required(key)
+        whole = _whole(value)
+        if whole is None or whole < low or (high is not None and whole > high):
+            bounds = f"of at least {low}" if high is None else f"from {low} to {high}"
+            raise self._wrong(key, f"a whole number {bounds}", value)
+        return whole
+
+    def index(self, key: str, length: int, of: str) -> int | None:
+        """An index into a list `of` that length; None where the key is absent."""
+        if key not in self.members:
+            return None
+        return as_index(self.members[key], self.at(key), length, of)
+
+    def required_index(self, key: str, length: int, of: str) -> int:
+        return as_index(self._required(key), self.at(key), length, of)
+
+    def indices(self, key: str, length: int, of: str) -> list[int]:
+        """A list of such indices; empty where the key is absent."""
+        if key not in self.members:
+            return []
+        place = self.at(key)
+        return [as_index(item, f"{place}[{i}]", length, of) for i, item in enumerate(self._list(key))]
+
+    def number(
+        self, key: str, default: float | None = None, low: float = -math.inf, high: float = math.inf
+    ) -> float:
+        value = default if key not in self.members and default is not None else self._required(key)
+        if not _is_number(value) or not low <= value <= high:
+            bounds = "" if low == -math.inf and high == math.inf else f" from {low:g} to {high:g}"
+            raise self._wrong(key, f"a finite number{bounds}", value)
+        return float(value)
+
+    def numbers(
+        self, key: str, count: int, default: Sequence[float] | None = None
+    ) -> Float64[np.ndarray, " count"]:
+        value = default if key not in self.members and default is not None else self._required(key)
+        if not isinstance(value, list | tuple) or len(value) != count or not all(map(_is_number, value)):
+            raise self._wrong(key, f"a list of {count} finite numbers", value)
+        return np.array(value, np.float64)
+
+    def _list(self, key: str) -> list[Any]:
+        value = self.members.get(key, [])
+        if not isinstance(value, list):
+            raise self._wrong(key, "a list", value)
+        return value
+
+    def _required(self, key: str) -> Any:
+        if key not in self.members:
+            raise SceneFileError(f"{self.where or 'the document'}: key '{key}' is missing")
+        return self.members[key]
+
+    def _wrong(self, key: str, rule: str, value: Any) -> SceneFileError:
+        return SceneFileError(f"{self.at(key)}: must be {rule}, got {shown(value)}")
+
+
+def parse_json(content: bytes) -> JsonObject:
+    """Parse a JSON document whose top is an object.
+
+    Raises:
+        SceneFileError: not UTF-8, not JSON, a key twice in one object, NaN, an infinity, a number beyond
+            double precision, nesting too deep, or too many values.
+    """
+    # Commas and opening brackets bound the number of values from above.
+    if sum(content.count(mark) for mark in (b",", b"{", b"[")) > MAX_JSON_VALUES:
+        raise SceneFileError(f"the document: must hold at most {MAX_JSON_VALUES:,} JSON values")
+    try:
+        document = json.loads(
+            content.decode("utf-8-sig"),  # glTF lets a reader pass over a byte order mark
+            object_pairs_hook=_unique_keys,
+            parse_constant=_no_constant,
+            parse_float=_finite_float,
+        )
+    except SceneFileError:
+        raise
+    except RecursionError as error:
+        raise SceneFileError("the document: JSON is nested too deep") from error
+    except ValueError as error:
+        raise SceneFileError(f"the document: is not JSON ({error})") from error
+    return _as_object(document, "")
+
+
+def as_index(value: Any, where: str, length: int, of: str) -> int:
+    """`value` as an index into a list `of` that length.
+
+    Raises:
+        SceneFileError: it is no whole number in range.
+    """
+    whole = _whole(value)
+    if whole is None or not 0 <= whole < length:
+        raise SceneFileError(f"{where}: must be an index into the {length} {of}, got {shown(value)}")
+    return whole
+
+
+def shown(value: Any) -> str:
+    """A value for a message: short, whatever it is."""
+    if isinstance(value, dict | list | tuple) and len(value) > 16:
+        return f"{'an object' if isinstance(value, dict) else 'a list'} of {len(value)} members"
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) > 10**30:
+        return f"a whole number of {value.bit_length()} bits"
+    if isinstance(value, dict | list | tuple):
+        return f"{type(value)(value)!r:.60}" if all(_is_plain(v) for v in value) else "nested values"
+    return f"{value!r:.60}"
+
+
+def _is_plain(value: Any) -> bool:
+    return isinstance(value, str | float | bool | None) or (isinstance(value, int) and abs(value) < 10**30)
+
+
+def _as_object(value: Any, where: str) -> JsonObject:
+    if not isinstance(value, dict):
+        raise SceneFileError(f"{where or 'the document'}: must be an object, got {shown(value)}")
+    return JsonObject(value, where)
+
+
+def _is_number(value: Any) -> bool:
+    # bool is an int to Python, not to JSON.
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _LARGEST_NUMBER
+
+
+def _whole(value: Any) -> int | None:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    # 2**53: beyond it a float holds only every other whole number.
+    return int(value) if value == value // 1 and abs(value) <= 2**53 else None
+
+
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    members = dict(pairs)
+    if len(members) != len(pairs):
+        seen: set[str] = set()
+        twice = next(key for key, _ in pairs if key in seen or seen.add(key))
+        raise SceneFileError(f"the document: key {twice!r:.60} stands twice in one object")
+    return members
+
+
+def _no_constant(name: str) -> float:
+    raise SceneFileError(f"the document: {name} is not a JSON number")
+
+
+def _finite_float(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise SceneFileError(f"the document: number {text:.40} is too large")
+    return value

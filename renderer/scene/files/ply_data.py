@@ -1,0 +1,231 @@
+"""PLY taken apart: header, and the columns of its elements, from ASCII or binary data."""
+
+import struct
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float64, Int64
+
+from vpltune.renderer.scene.files.diagnostics import SceneFileError
+from vpltune.renderer.scene.files.limits import DecodedBytes
+
+_TYPES = {
+    "char": "b", "int8": "b", "uchar": "B", "uint8": "B", "short": "h", "int16": "h", "ushort": "H",
+    "uint16": "H", "int": "i", "int32": "i", "uint": "I", "uint32": "I", "float": "f", "float32": "f",
+    "double": "d", "float64": "d",
+}  # fmt: skip
+_BYTE_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
+_LONGEST_HEADER = 1 << 16
+_LONGEST_NUMBER = 64
+
+
+@dataclass(frozen=True)
+class PlyProperty:
+    """A scalar property, or with a `count_type` a list; types are those of the struct module."""
+
+    name: str
+    type: str
+    count_type: str = ""
+
+
+@dataclass(frozen=True)
+class PlyElement:
+    name: str
+    count: int
+    properties: list[PlyProperty] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class PlyHeader:
+    byte_order: str
+    """"<" or ">", empty for ASCII."""
+    elements: list[PlyElement]
+    texture_name: str
+    size: int
+    """In bytes; the data follow."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlyColumn:
+    """One property over all rows of its element; of a list property, all rows' values one after another."""
+
+    values: Float64[np.ndarray, " values"]
+    type: str
+    sizes: Int64[np.ndarray, " rows"] | None = None
+    """The length of each row's list; None for a scalar property."""
+
+
+def parse_ply_header(content: bytes) -> PlyHeader:
+    """Read the header.
+
+    Raises:
+        SceneFileError: it is no PLY header.
+    """
+    end = content.find(b"end_header", 0, _LONGEST_HEADER)
+    if not content.startswith(b"ply") or end < 0:
+        raise SceneFileError("header: must begin with 'ply' and end with 'end_header'")
+    size = end + len(b"end_header")
+    size += 2 if content[size : size + 2] == b"\r\n" else 1
+    byte_order, texture_name, elements = None, "", []
+    for line in content[3:end].decode("utf-8", "replace").splitlines():
+        words = line.split()
+        match words:
+            case ["format", name, *_] if name in _BYTE_ORDERS:
+                byte_order = _BYTE_ORDERS[name]
+            case ["element", name, count] if count.isdecimal() and len(count) < 13:
+                elements.append(PlyElement(name, int(count)))
+            case ["property", "list", count_type, type_, name] if elements and {count_type, type_} <= set(
+                _TYPES
+            ):
+                elements[-1].properties.append(PlyProperty(name, _TYPES[type_], _TYPES[count_type]))
+            case ["property", type_, name] if elements and type_ in _TYPES:
+                elements[-1].properties.append(PlyProperty(name, _TYPES[type_]))
+            case ["comment", "TextureFile", *_]:
+                texture_name = line.split("TextureFile", 1)[1].strip()
+            case [] | ["comment" | "obj_info", *_]:
+                pass
+            case _:
+                raise SceneFileError(f"header: line {line!r:.80} is not understood")
+    if byte_order is None:
+        raise SceneFileError(
+            "header: must have a format line: ascii, binary_little_endian or binary_big_endian"
+        )
+    return PlyHeader(byte_order, elements, texture_name, size)
+
+
+class PlyData:
+    """The data of a PLY file, read element by element in the header's order."""
+
+    def __init__(self, content: bytes, header: PlyHeader, decoded: DecodedBytes) -> None:
+        self._order = header.byte_order
+        self._decoded = decoded
+        self._at = 0
+        self._source = (
+            content[header.size :] if header.byte_order else _ascii_numbers(content[header.size :], decoded)
+        )
+
+    @property
+    def left(self) -> int:
+        """Bytes, or numbers of an ASCII file, that no element has taken."""
+        return len(self._source) - self._at
+
+    def read(self, element: PlyElement) -> dict[str, PlyColumn]:
+        """The columns of the next element.
+
+        Raises:
+            SceneFileError: the data are cut off, or a list has a negative or fractional length.
+        """
+        if not element.count or not element.properties:
+            return {p.name: PlyColumn(np.empty(0), p.type, _no_rows(p)) for p in element.properties}
+        # Every row has at least one number for each property.
+        least = element.count * sum(self._width(p.count_type or p.type) for p in element.properties)
+        if least > self.left:
+            raise SceneFileError(f"element '{element.name:.40}': its {element.count} rows are cut off")
+        self._decoded.spend(8 * element.count * len(element.properties), f"element '{element.name:.40}'")
+        columns = self._read_alike(element)
+        return self._read_row_by_row(element) if columns is None else columns
+
+    def _read_alike(self, element: PlyElement) -> dict[str, PlyColumn] | None:
+        """All rows at once, if every list is as long as in the first row; else None."""
+        lengths, offset = [], self._at
+        for p in element.properties:
+            length = 1
+            if p.count_type:
+                length = self._number(offset, p.count_type, element)
+                offset += self._width(p.count_type)
+            lengths.append(length)
+            offset += length * self._width(p.type)
+        row = offset - self._at
+        if row * element.count > self.left:
+            return None
+        columns, at = {}, self._at
+        for p, length in zip(element.properties, lengths, strict=True):
+            sizes = None
+            if p.count_type:
+                if (self._column(at, p.count_type, 1, row, element.count) != length).any():
+                    return None
+                at += self._width(p.count_type)
+                sizes = np.full(element.count, length, np.int64)
+                self._decoded.spend(8 * length * element.count, f"element '{element.name:.40}'")
+            columns[p.name] = PlyColumn(
+                self._column(at, p.type, length, row, element.count).ravel(), p.type, sizes
+            )
+            at += length * self._width(p.type)
+        self._at += row * element.count
+        return columns
+
+    def _read_row_by_row(self, element: PlyElement) -> dict[str, PlyColumn]:
+        sizes: dict[str, list[int]] = {p.name: [] for p in element.properties}
+        values: dict[str, list[float]] = {p.name: [] for p in element.properties}
+        # Python numbers: at most one for each byte that is left.
+        self._decoded.spend(min(40 * self.left, 1 << 62), f"element '{element.name:.40}'")
+        for _ in range(element.count):
+            for p in element.properties:
+                length = 1
+                if p.count_type:
+                    length = self._number(self._at, p.count_type, element)
+                    self._at += self._width(p.count_type)
+                end = self._at + length * self._width(p.type)
+                if end > len(self._source):
+                    raise SceneFileError(
+                        f"element '{element.name:.40}': its {element.count} rows are cut off"
+                    )
+                if self._order:
+                    values[p.name] += struct.unpack_from(
+                        f"{self._order}{length}{p.type}", self._source, self._at
+                    )
+                else:
+                    values[p.name] += self._source[self._at : end].tolist()
+                sizes[p.name].append(length)
+                self._at = end
+        return {
+            p.name: PlyColumn(
+                np.array(values[p.name], np.float64),
+                p.type,
+                np.array(sizes[p.name], np.int64) if p.count_type else None,
+            )
+            for p in element.properties
+        }
+
+    def _width(self, type_: str) -> int:
+        """Of one number in the source: bytes, or one for an ASCII file's numbers."""
+        return struct.calcsize(f"<{type_}") if self._order else 1
+
+    def _number(self, at: int, type_: str, element: PlyElement) -> int:
+        if at + self._width(type_) > len(self._source):
+            raise SceneFileError(f"element '{element.name:.40}': its {element.count} rows are cut off")
+        number = (
+            struct.unpack_from(self._order + type_, self._source, at)[0] if self._order else self._source[at]
+        )
+        if not 0 <= number <= len(self._source) or number != int(number):
+            raise SceneFileError(
+                f"element '{element.name:.40}': a list's length must fit the file, got {number}"
+            )
+        return int(number)
+
+    def _column(
+        self, at: int, type_: str, length: int, row: int, count: int
+    ) -> Float64[np.ndarray, "rows length"]:
+        if not self._order:
+            rows = self._source[self._at : self._at + row * count].reshape(count, row)
+            return rows[:, at - self._at : at - self._at + length]
+        dtype = np.dtype(type_).newbyteorder(self._order)
+        return np.ndarray((count, length), dtype, self._source, at, (row, dtype.itemsize)).astype(np.float64)
+
+
+def _no_rows(p: PlyProperty) -> Int64[np.ndarray, "0"] | None:
+    return np.empty(0, np.int64) if p.count_type else None
+
+
+def _ascii_numbers(body: bytes, decoded: DecodedBytes) -> Float64[np.ndarray, " numbers"]:
+    decoded.spend(4 * len(body), "the data")
+    words = body.split()
+    longest = max(map(len, words), default=0)
+    if longest > _LONGEST_NUMBER:
+        raise SceneFileError(
+            f"the data: a number must have at most {_LONGEST_NUMBER} characters, got {longest}"
+        )
+    try:
+        return np.array(words, f"S{max(longest, 1)}").astype(np.float64)
+    except ValueError as error:
+        raise SceneFileError(f"the data: must be numbers ({error})") from error

@@ -1,0 +1,78 @@
+"""Reading files, but only regular ones, of a bounded size, inside the scene's own folder."""
+
+import os
+import stat
+from pathlib import Path
+
+from vpltune.renderer.scene.files.diagnostics import SceneFileError
+from vpltune.renderer.scene.files.limits import MAX_FILE_BYTES
+
+
+class SceneFolder:
+    """The folder a scene file stands in: whatever the file refers to is looked for here and nowhere else."""
+
+    def __init__(self, scene_path: Path) -> None:
+        self._root = scene_path.parent.resolve()
+        self._left = MAX_FILE_BYTES
+
+    def read_scene_file(self, path: Path) -> bytes:
+        """The bytes of the scene file itself, which the user named and which may be a link to anywhere.
+
+        Raises:
+            SceneFileError: it is missing, not a regular file, unreadable or too large.
+        """
+        return self._read(path, "")
+
+    def read(self, relative: str, where: str) -> bytes:
+        """The bytes of a file that the scene refers to, by a path relative to the folder.
+
+        Raises:
+            SceneFileError: the path leads out of the folder (links followed), or the file is missing, not
+                regular, unreadable, or too large together with what was read before.
+        """
+        return self._read(self._inside(relative, where), f"{where}: {relative!r:.80} ")
+
+    def has(self, relative: str, where: str) -> bool:
+        """Whether `relative` leads to something inside the folder.
+
+        Raises:
+            SceneFileError: it leads out of the folder.
+        """
+        return self._inside(relative, where).exists()
+
+    def _inside(self, relative: str, where: str) -> Path:
+        shown = f"{relative!r:.80}"
+        if not relative or "\0" in relative:
+            raise SceneFileError(f"{where}: must name a file in the scene's folder, got {shown}")
+        try:
+            resolved = (self._root / relative).resolve()
+        except (OSError, RuntimeError) as error:  # a name too long; a loop of links (Python < 3.13)
+            raise SceneFileError(f"{where}: {shown} cannot be opened ({_cause(error)})") from error
+        if not resolved.is_relative_to(self._root):
+            raise SceneFileError(f"{where}: must stay inside the scene's folder, got {shown}")
+        return resolved
+
+    def _read(self, path: Path, subject: str) -> bytes:
+        try:
+            # Looked at before it is opened: opening a device can have effects, and a FIFO blocks.
+            if not stat.S_ISREG(path.stat().st_mode):
+                raise SceneFileError(f"{subject}is not a regular file")
+            handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+            with os.fdopen(handle, "rb") as file:
+                found = os.fstat(handle)
+                if not stat.S_ISREG(found.st_mode):
+                    raise SceneFileError(f"{subject}is not a regular file")
+                if found.st_size > self._left:
+                    raise SceneFileError(
+                        f"{subject}has {found.st_size >> 20} MiB, and all files of a scene together must "
+                        f"have at most {MAX_FILE_BYTES >> 20} MiB"
+                    )
+                content = file.read(found.st_size)
+        except OSError as error:
+            raise SceneFileError(f"{subject}cannot be read ({_cause(error)})") from error
+        self._left -= len(content)
+        return content
+
+
+def _cause(error: Exception) -> str:
+    return (error.strerror or str(error)) if isinstance(error, OSError) else str(error)

@@ -1,0 +1,68 @@
+"""The way in: which reader a file goes to, and the checks that hold for every scene."""
+
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, one_line
+from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, SMALLEST_EXTENT
+from vpltune.renderer.scene.scene import Scene
+
+# Modules by name, so that an OBJ is read without loading Draco.
+_READERS = {
+    ".gltf": ("gltf_scene", "read_gltf"),
+    ".glb": ("gltf_scene", "read_gltf"),
+    ".obj": ("obj_scene", "read_obj"),
+    ".ply": ("ply_scene", "read_ply"),
+}
+
+
+def read_scene(path: str | Path) -> Scene:
+    """Read a scene from a .gltf, .glb, .obj or .ply file.
+
+    Files that the scene refers to are looked for in its own folder only; nothing is fetched. What
+    is left out or approximated is said in `Scene.warnings`, a line each.
+
+    Raises:
+        InputError: the file cannot be read right; one line names the file and the cause.
+    """
+    path = Path(path)
+    try:
+        read = _reader_for(path)
+        # Every value that counts is tested for being finite; overflow on the way there is no event.
+        with np.errstate(all="ignore"):
+            scene = read(path, Warnings())
+            _check_whole(scene)
+    except SceneFileError as error:
+        raise InputError(one_line(f"{path}: ", 4096) + one_line(str(error))) from error
+    except MemoryError as error:
+        raise InputError(one_line(f"{path}: ", 4096) + "does not fit into memory") from error
+    return scene
+
+
+def _reader_for(path: Path) -> Callable[[Path, Warnings], Scene]:
+    suffix = path.suffix.lower()
+    if suffix == ".xml":
+        raise SceneFileError("Mitsuba XML is not read; turn it into a .glb with `vpltune import`")
+    if suffix not in _READERS:
+        raise SceneFileError(f"a scene must be one of {', '.join(_READERS)}, got {suffix or 'no suffix'!r}")
+    module, function = _READERS[suffix]
+    return getattr(importlib.import_module(f"vpltune.renderer.scene.files.{module}"), function)
+
+
+def _check_whole(scene: Scene) -> None:
+    if not scene.instances:
+        hints = f" ({'; '.join(scene.warnings)})" if scene.warnings else ""
+        raise SceneFileError(f"the scene has no triangles{hints}")
+    low, high = scene.bounds()
+    if not max(np.abs(low).max(), np.abs(high).max()) <= LARGEST_COORDINATE:
+        raise SceneFileError(
+            f"the scene must lie within {LARGEST_COORDINATE:g} of the origin, got {low} to {high}"
+        )
+    if not np.linalg.norm(high - low) >= SMALLEST_EXTENT:
+        raise SceneFileError(
+            f"the scene must be at least {SMALLEST_EXTENT:g} across, got {np.linalg.norm(high - low):g}"
+        )

@@ -1,0 +1,257 @@
+"""Mitsuba's emitters as punctual lights of the same radiant flux, as near as those can come.
+
+An area emitter of radiance L and area A sends out π·A·L from one side, as the cosine of the angle to its
+normal. Spots with a cone of 90° fall off as cos² (KHR_lights_punctual, an inner angle of 0), and cos² adds up
+to 2π/3 over the hemisphere: a spot of 3/2·A·L along the axis carries the same flux, a little more of it
+forwards. An emitter that faces no one way, such as a sphere, becomes a point of A·L/4.
+"""
+
+import math
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+from jaxtyping import Float64
+
+from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
+from vpltune.renderer.scene.files.scene_folder import SceneFolder
+from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
+from vpltune.renderer.scene.scene import Light
+
+# An emitter faces one way where its triangles' normals, weighted by area, add up to this share of the area.
+_FACES_ONE_WAY = 0.9
+# How far before its surface a spot stands, of the surface's size: past the rounding of its own plane.
+_LIFT = 1e-3
+# Half angle of the part of an environment that one directional light stands for.
+_SUN_CONE = math.radians(30.0)
+_COARSE_ROWS = 24
+MOST_LIGHTS = 8
+_LEAST_SHARE = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class AreaEmitter:
+    """Where an emitting shape is, and what it sends out."""
+
+    light: Light
+    flux: float
+    """Mean over the channels [W]."""
+    hides_itself: bool
+    """Whether its own surface would stand around the light."""
+
+
+def area_emitter(
+    emitter: Plugin, corners_world: Float64[np.ndarray, "triangles 3 3"], outwards: float
+) -> AreaEmitter | None:
+    """The light in place of an area emitter; None where it sends out nothing.
+
+    Args:
+        corners_world: of the emitting shape's triangles.
+        outwards: 1 where light leaves on the side that winds counter-clockwise, −1 on the other.
+    """
+    radiance = _radiance(emitter)
+    vectors = np.cross(
+        corners_world[:, 1] - corners_world[:, 0], corners_world[:, 2] - corners_world[:, 0]
+    ) * (0.5 * outwards)
+    areas = np.linalg.norm(vectors, axis=1)
+    area = float(areas.sum())
+    if not (area > 0.0 and radiance.any()):
+        return None
+    center = (areas[:, None] * corners_world.mean(axis=1)).sum(axis=0) / area
+    net = vectors.sum(axis=0)
+    facing = float(np.linalg.norm(net))
+    flux = math.pi * area * float(radiance.mean())
+    if facing < _FACES_ONE_WAY * area:
+        light = Light("point", radiance * (area / 4.0), center, name="area emitter")
+        return AreaEmitter(light, flux, True)
+    direction = net / facing
+    position = center + direction * (_LIFT * math.sqrt(area))
+    light = Light(
+        "spot", radiance * (1.5 * area), position, direction, 0.0, math.pi / 2.0, name="area emitter"
+    )
+    return AreaEmitter(light, flux, False)
+
+
+def punctual_light(
+    emitter: Plugin, folder: SceneFolder, extent: float, warnings: Warnings
+) -> tuple[Light, float] | None:
+    """The light for an emitter that is no shape, and its flux into a scene `extent` across; None without one.
+
+    Raises:
+        SceneFileError: the type is not known here, or a file cannot be read.
+    """
+    across = math.pi * (extent / 2.0) ** 2
+    match emitter.type:
+        case "point":
+            intensity = emitter.vector("intensity", (1.0, 1.0, 1.0))
+            light = Light("point", intensity, _position(emitter), name="point")
+            flux = 4.0 * math.pi * float(intensity.mean())
+        case "spot":
+            light, flux = _spot(emitter, warnings)
+        case "directional":
+            light = _directional(emitter)
+            flux = across * float(light.intensity.mean())
+        case "envmap":
+            return _environment(emitter, folder, across, warnings)
+        case "constant":
+            warnings.add(
+                "the constant environment comes from all sides alike: no punctual light can stand for it"
+            )
+            return None
+        case _:
+            raise SceneFileError(f"{emitter.where}: emitters of this type are not read")
+    return (light, flux) if light.intensity.any() else None
+
+
+def strongest(lights: list[tuple[Light, float]], warnings: Warnings) -> tuple[Light, ...]:
+    """The lights that matter: at most `MOST_LIGHTS`, and without the last 1 % of all flux."""
+    order = sorted(range(len(lights)), key=lambda i: -lights[i][1])
+    total = sum(flux for _, flux in lights)
+    kept: list[int] = []
+    carried = 0.0
+    for index in order:
+        if len(kept) == MOST_LIGHTS or carried >= (1.0 - _LEAST_SHARE) * total:
+            break
+        kept.append(index)
+        carried += lights[index][1]
+    left_out = len(lights) - len(kept)
+    if left_out:
+        warnings.add(
+            f"{left_out} of {len(lights)} lights are left out, with {1.0 - carried / total:.1%} of the flux"
+        )
+    return tuple(lights[index][0] for index in sorted(kept))
+
+
+def _radiance(emitter: Plugin) -> Float64[np.ndarray, "3"]:
+    if emitter.child("radiance") is not None:
+        raise SceneFileError(f"{emitter.where}: a textured radiance is not read")
+    return emitter.vector("radiance", (1.0, 1.0, 1.0))
+
+
+def _position(emitter: Plugin) -> Float64[np.ndarray, "3"]:
+    if "position" in emitter.values:
+        return emitter.vector("position", (0.0, 0.0, 0.0))
+    return emitter.to_world()[:3, 3]
+
+
+def _spot(emitter: Plugin, warnings: Warnings) -> tuple[Light, float]:
+    outer = math.radians(emitter.number("cutoff_angle", 20.0))
+    inner = math.radians(emitter.number("beam_width", math.degrees(outer) * 0.75))
+    if not 0.0 <= inner < outer <= math.pi / 2.0:
+        raise SceneFileError(
+            f"{emitter.where}: must have 0 ≤ beam_width < cutoff_angle ≤ 90, "
+            f"got {math.degrees(inner):g} and {math.degrees(outer):g}"
+        )
+    warnings.tally(
+        "1 spot's light fades between its two angles as glTF has it, not linearly with the angle",
+        "{n} spots' light fades between their two angles as glTF has it, not linearly with the angle",
+    )
+    to_world = emitter.to_world()
+    intensity = emitter.vector("intensity", (1.0, 1.0, 1.0))
+    light = Light(
+        "spot", intensity, to_world[:3, 3], _unit(to_world[:3, 2], emitter), inner, outer, name="spot"
+    )
+    return light, 2.0 * math.pi * (1.0 - math.cos((inner + outer) / 2.0)) * float(intensity.mean())
+
+
+def _directional(emitter: Plugin) -> Light:
+    direction = emitter.to_world()[:3, 2]
+    if "direction" in emitter.values:
+        direction = emitter.vector("direction", (0.0, 0.0, 1.0))
+    irradiance = emitter.vector("irradiance", (1.0, 1.0, 1.0))
+    return Light("directional", irradiance, direction_world=_unit(direction, emitter), name="directional")
+
+
+def _environment(
+    emitter: Plugin, folder: SceneFolder, across: float, warnings: Warnings
+) -> tuple[Light, float] | None:
+    """A directional light for the brightest part of the environment, with the light vector of that part.
+
+    The light vector (Gershun 1939) is the net flux through a surface square to it. That of the whole
+    environment would point up between a low sun and the sky, where rooms have their ceilings.
+    """
+    name = emitter.text("filename")
+    content = folder.read(name, emitter.where)
+    if not name.lower().endswith(".exr"):
+        warnings.add(f"the environment {name!r:.80} is left out: only .exr is read")
+        return None
+    pixels = _exr_pixels(content, f"{emitter.where}: {name!r:.80}") * emitter.number("scale", 1.0)
+    directions, flux = _coarse_sky(pixels)
+    inside = directions @ directions.T > math.cos(_SUN_CONE)
+    # [cone, axis, channel]
+    vectors = np.einsum("cd,da,dr->car", inside.astype(np.float64), directions, flux)
+    strength = np.linalg.norm(vectors.mean(axis=2), axis=1)
+    total = float(flux.sum(axis=0).mean())
+    brightest = int(strength.argmax())
+    share = float(strength[brightest]) / total if total > 0.0 else 0.0
+    # A cone's share of an even environment, and a half more: what falls short of it comes from all sides.
+    if share < 1.5 * (1.0 - math.cos(_SUN_CONE)) / 2.0:
+        warnings.add(f"the environment {name!r:.80} comes from all sides: no punctual light can stand for it")
+        return None
+    towards = vectors[brightest].mean(axis=1)
+    unit = towards / np.linalg.norm(towards)
+    irradiance = np.maximum(unit @ vectors[brightest], 0.0)
+    direction = _unit(-(emitter.to_world()[:3, :3] @ unit), emitter)
+    warnings.add(
+        f"the environment {name!r:.80} becomes one directional light for its brightest "
+        f"{math.degrees(2 * _SUN_CONE):.0f}°, {share:.0%} of its light"
+    )
+    light = Light("directional", irradiance, direction_world=direction, name="environment")
+    return light, across * float(irradiance.mean())
+
+
+def _coarse_sky(
+    pixels: Float64[np.ndarray, "rows columns 3"],
+) -> tuple[Float64[np.ndarray, "cells 3"], Float64[np.ndarray, "cells 3"]]:
+    """Directions of the cells of a coarse map, and the radiance in each times its solid angle."""
+    rows, columns, _ = pixels.shape
+    azimuth = 2.0 * np.pi * (np.arange(columns) + 0.5) / columns
+    polar = np.pi * (np.arange(rows) + 0.5) / rows
+    weighted = pixels * (2.0 * np.pi / columns * np.pi / rows * np.sin(polar)[:, None, None])
+    # Mitsuba: azimuth counts from −Z towards +X, the polar angle from +Y.
+    sine, cosine = np.sin(polar)[:, None], np.cos(polar)[:, None]
+    directions = np.stack(
+        np.broadcast_arrays(sine * np.sin(azimuth), cosine, -sine * np.cos(azimuth)), axis=-1
+    )
+    row = np.arange(rows) * min(rows, _COARSE_ROWS) // rows
+    column = np.arange(columns) * min(columns, 2 * _COARSE_ROWS) // columns
+    cell = (row[:, None] * 2 * _COARSE_ROWS + column).ravel()
+    count = 2 * _COARSE_ROWS**2
+
+    def summed(values: np.ndarray) -> Float64[np.ndarray, "cells 3"]:
+        return np.stack([np.bincount(cell, values[..., i].ravel(), count) for i in range(3)], axis=-1)
+
+    middle = summed(directions)
+    length = np.linalg.norm(middle, axis=1)
+    used = length > 0.0
+    return middle[used] / length[used, None], summed(weighted)[used]
+
+
+def _exr_pixels(content: bytes, where: str) -> Float64[np.ndarray, "height width 3"]:
+    # The library reads by name only.
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "environment.exr"
+        copy.write_bytes(content)
+        try:
+            channels = OpenEXR.File(str(copy)).channels()
+        except Exception as error:  # of many kinds, none of them the library's own
+            raise SceneFileError(f"{where}: is no OpenEXR picture ({error})") from error
+        if "RGB" in channels or "RGBA" in channels:
+            pixels = (channels.get("RGB") or channels["RGBA"]).pixels[..., :3]
+        elif all(name in channels for name in "RGB"):
+            pixels = np.stack([channels[name].pixels for name in "RGB"], axis=-1)
+        else:
+            raise SceneFileError(f"{where}: has no channels R, G and B")
+        pixels = pixels.astype(np.float64)
+    if not (np.isfinite(pixels).all() and (pixels >= 0.0).all()):
+        raise SceneFileError(f"{where}: radiance must be finite and not negative")
+    return pixels
+
+
+def _unit(vector: Float64[np.ndarray, "3"], emitter: Plugin) -> Float64[np.ndarray, "3"]:
+    length = float(np.linalg.norm(vector))
+    if not length > 0.0:
+        raise SceneFileError(f"{emitter.where}: its direction must not be zero")
+    return vector / length

@@ -1,0 +1,206 @@
+"""A Mitsuba scene file as a `Scene`: camera, lights, diffuse materials and triangles."""
+
+import math
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float64
+
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, one_line
+from vpltune.renderer.scene.files.limits import DecodedBytes
+from vpltune.renderer.scene.files.scene_folder import SceneFolder
+from vpltune.renderer.scene.files.surface import finished_mesh
+from vpltune.renderer.scene.mitsuba_import.emitters import area_emitter, punctual_light, strongest
+from vpltune.renderer.scene.mitsuba_import.materials import MaterialReader, Surfacing
+from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin, plugin_tree
+from vpltune.renderer.scene.mitsuba_import.shapes import Shape, shape_triangles
+from vpltune.renderer.scene.mitsuba_import.xml_tree import parse_xml
+from vpltune.renderer.scene.scene import Camera, Instance, Light, Mesh, Scene, transform_points, without_scale
+
+# What decides how Mitsuba computes, and not what is there.
+_SILENT = ("integrator", "sampler", "film", "rfilter", "bsdf", "texture")
+
+
+def read_mitsuba(path: str | Path) -> Scene:
+    """Read a Mitsuba XML scene of version 0.5 to 3; `Scene.warnings` say what is approximated or left out.
+
+    Lengths and radiometric values are taken as they stand; files are looked for beside the scene or below.
+
+    Raises:
+        InputError: the file cannot be read right; one line names the file, the line in it and the cause.
+    """
+    path = Path(path)
+    try:
+        with np.errstate(all="ignore"):
+            return _Import(path).scene()
+    except SceneFileError as error:
+        raise InputError(one_line(f"{path}: ", 4096) + one_line(str(error))) from error
+    except (MemoryError, RecursionError) as error:
+        raise InputError(one_line(f"{path}: ", 4096) + "is too large") from error
+
+
+@dataclass(eq=False)
+class _Import:
+    path: Path
+    warnings: Warnings = field(default_factory=Warnings)
+    decoded: DecodedBytes = field(default_factory=DecodedBytes)
+    meshes: list[Mesh] = field(default_factory=list)
+    instances: list[Instance] = field(default_factory=list)
+    lights: list[tuple[Light, float]] = field(default_factory=list)
+    groups: dict[int, list[tuple[int, Float64[np.ndarray, "4 4"]]]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.folder = SceneFolder(self.path)
+        self.materials = MaterialReader(self.folder, self.warnings)
+
+    def scene(self) -> Scene:
+        root = plugin_tree(parse_xml(self.folder.read_scene_file(self.path)))
+        for plugin in root.of_kind("shape"):
+            if plugin.type == "shapegroup":
+                self.groups[id(plugin)] = [
+                    placed for shape in plugin.of_kind("shape") if (placed := self._mesh(shape)) is not None
+                ]
+            elif plugin.type == "instance":
+                self._place_group(plugin)
+            elif (placed := self._mesh(plugin)) is not None:
+                self.instances.append(Instance(f"{plugin.type} {placed[0]}", *placed))
+        if not self.instances:
+            raise SceneFileError("the scene has no triangles")
+        scene = Scene(
+            name=self.path.stem if self.path.stem != "scene" else self.path.resolve().parent.name,
+            meshes=tuple(self.meshes),
+            instances=tuple(self.instances),
+            materials=tuple(self.materials.materials),
+            textures=tuple(self.materials.textures),
+        )
+        low, high = scene.bounds()
+        extent = float(np.linalg.norm(high - low))
+        for emitter in root.of_kind("emitter"):
+            found = punctual_light(emitter, self.folder, extent, self.warnings)
+            if found is not None:
+                self.lights.append(found)
+        self._say_unread(root)
+        cameras = tuple(camera for sensor in root.of_kind("sensor") if (camera := self._camera(sensor)))
+        if not self.lights:
+            self.warnings.add("no light could be brought over: give one, or let `vpltune fit` place it")
+        return replace(
+            scene,
+            lights=strongest(self.lights, self.warnings),
+            cameras=cameras,
+            warnings=self.warnings.lines(),
+        )
+
+    def _mesh(self, plugin: Plugin) -> tuple[int, Float64[np.ndarray, "4 4"]] | None:
+        """Number of the shape's mesh, and where it stands; None where no surface is left."""
+        shape = shape_triangles(plugin, self.path, self.folder, self.warnings)
+        to_world = plugin.to_world() @ shape.to_shape
+        hidden = self._emit(plugin, shape, to_world)
+        surfacing = self.materials.surfacing(next(iter(plugin.of_kind("bsdf")), None))
+        if surfacing is None or hidden:
+            return None
+        mesh = self._finished(plugin, shape, surfacing)
+        if mesh is None:
+            return None
+        self.meshes.append(mesh)
+        return len(self.meshes) - 1, to_world
+
+    def _finished(self, plugin: Plugin, shape: Shape, surfacing: Surfacing) -> Mesh | None:
+        surface = shape.surface
+        if surface.uv is not None:
+            uv = surface.uv @ surfacing.to_uv[:2, :2].T + surfacing.to_uv[:2, 2]
+            surface = replace(surface, uv=uv.astype(np.float32))
+        name = Path(plugin.text("filename", plugin.type)).stem
+        return finished_mesh(surface, name, surfacing.material, self.decoded, plugin.where)
+
+    def _emit(self, plugin: Plugin, shape: Shape, to_world: Float64[np.ndarray, "4 4"]) -> bool:
+        """Add the light of an emitting shape; whether its surface must go, lest it stand around the light."""
+        emitters = plugin.of_kind("emitter")
+        if not emitters:
+            return False
+        surface = shape.surface
+        corners = transform_points(to_world, surface.positions)[surface.triangles]
+        outwards = -1.0 if plugin.flag("flip_normals", False) else 1.0
+        if plugin.type not in ("obj", "ply", "cube") and np.linalg.det(to_world[:3, :3]) < 0.0:
+            # Mitsuba carries an analytic shape's normal along; a mesh's comes from its mirrored triangles.
+            outwards = -outwards
+        found = area_emitter(emitters[0], corners, outwards)
+        if found is None:
+            return False
+        kind = found.light.kind
+        if kind == "spot":
+            self.warnings.tally(
+                "1 area emitter becomes a spot of its flux at its centre, along its normal, falling as cos²",
+                "{n} area emitters become spots of their flux at their centres, along their normals, falling "
+                "as cos²",
+            )
+        else:
+            self.warnings.tally(
+                "1 round area emitter becomes a point of its flux at its centre, and its surface goes",
+                "{n} round area emitters become points of their flux at their centres; their surfaces go",
+            )
+        self.lights.append((found.light, found.flux))
+        return found.hides_itself
+
+    def _place_group(self, plugin: Plugin) -> None:
+        for group in plugin.of_kind("shape"):
+            if id(group) not in self.groups:
+                raise SceneFileError(f"{plugin.where}: must refer to a shapegroup that stands before it")
+            for mesh, to_group in self.groups[id(group)]:
+                self.instances.append(Instance(f"instance {mesh}", mesh, plugin.to_world() @ to_group))
+
+    def _camera(self, sensor: Plugin) -> Camera | None:
+        if sensor.type not in ("perspective", "thinlens"):
+            self.warnings.add(f"sensor '{sensor.type}' is left out: only perspective ones are brought over")
+            return None
+        if sensor.type == "thinlens":
+            self.warnings.add("the camera's depth of field is left out")
+        film = next(iter(sensor.of_kind("film")), None)
+        width = film.number("width", 768.0) if film else 768.0
+        height = film.number("height", 576.0) if film else 576.0
+        if not (width >= 1.0 and height >= 1.0):
+            raise SceneFileError(f"{sensor.where}: its film must have a width and a height of at least 1")
+        matrix = sensor.to_world()
+        if np.linalg.det(matrix[:3, :3]) < 0.0:
+            self.warnings.add("the camera's picture is mirrored in Mitsuba, and is not here")
+        # Mitsuba looks along +Z with +X to the left.
+        rigid = without_scale(matrix @ np.diag([-1.0, 1.0, -1.0, 1.0]))
+        if rigid is None:
+            raise SceneFileError(f"{sensor.where}: its transform leaves it no direction")
+        return Camera(rigid, _vertical_angle(sensor, width, height))
+
+    def _say_unread(self, root: Plugin) -> None:
+        if any(plugin.of_kind("medium") for plugin in root.of_kind("shape")) or root.of_kind("medium"):
+            self.warnings.add("participating media are left out")
+        for _, plugin in root.children:
+            if plugin.kind not in (*_SILENT, "shape", "emitter", "sensor", "medium"):
+                self.warnings.add(f"{plugin.where}: is left out")
+
+
+def _vertical_angle(sensor: Plugin, width: float, height: float) -> float:
+    """Full vertical angle of view, from `fov` along `fov_axis`, or from the focal length on 35 mm film."""
+    axis = sensor.text("fov_axis", "x")
+    if "fov" in sensor.values:
+        angle = math.radians(sensor.number("fov", 0.0))
+    else:
+        text = sensor.text("focal_length", "50mm").strip().removesuffix("mm")
+        try:
+            focal = float(text)
+        except ValueError:
+            focal = math.nan
+        if not 0.0 < focal < 1e6:
+            raise SceneFileError(f"{sensor.where}: focal_length must be like '50mm', got {text!r:.40}")
+        angle, axis = 2.0 * math.atan(math.hypot(36.0, 24.0) / 2.0 / focal), "diagonal"
+    if not 0.0 < angle < math.pi:
+        raise SceneFileError(f"{sensor.where}: fov must lie in (0, 180) degrees, got {math.degrees(angle):g}")
+    sides = {
+        "x": width,
+        "y": height,
+        "smaller": min(width, height),
+        "larger": max(width, height),
+        "diagonal": math.hypot(width, height),
+    }
+    if axis not in sides:
+        raise SceneFileError(f"{sensor.where}: fov_axis must be one of {', '.join(sides)}, got {axis!r:.40}")
+    return 2.0 * math.atan(math.tan(angle / 2.0) * height / sides[axis])

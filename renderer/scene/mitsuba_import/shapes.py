@@ -1,0 +1,224 @@
+"""Mitsuba's shapes as triangles, in their own space."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float32, Float64, Int64
+
+from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
+from vpltune.renderer.scene.files.obj_scene import read_obj
+from vpltune.renderer.scene.files.ply_scene import read_ply
+from vpltune.renderer.scene.files.scene_folder import SceneFolder
+from vpltune.renderer.scene.files.surface import Surface
+from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
+from vpltune.renderer.scene.scene import Mesh
+
+# Chords cut 0.1 % off a circle of so many sides, and a sphere of half as many rings.
+_SIDES = 80
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Triangles, and the transform that the shape's own parameters add before `to_world`."""
+
+    surface: Surface
+    to_shape: Float64[np.ndarray, "4 4"]
+
+
+def shape_triangles(shape: Plugin, path: Path, folder: SceneFolder, warnings: Warnings) -> Shape:
+    """The triangles of a shape; files that it names lie beside the scene file `path`, or below.
+
+    Texture coordinates have their origin at the top left, as Mitsuba's and glTF's have.
+
+    Raises:
+        SceneFileError: the type is not known here, or its file cannot be read.
+    """
+    if shape.type in ("obj", "ply"):
+        return Shape(_from_file(shape, path, folder, warnings), np.eye(4))
+    make = _ANALYTIC.get(shape.type)
+    if make is None:
+        known = ", ".join(("obj", "ply", *_ANALYTIC))
+        raise SceneFileError(f"{shape.where}: shapes of this type are not read; known are {known}")
+    made = make(shape)
+    if shape.flag("face_normals", False):
+        made = replace(made, surface=replace(made.surface, normals=None))
+    return made
+
+
+def _from_file(shape: Plugin, path: Path, folder: SceneFolder, warnings: Warnings) -> Surface:
+    name = shape.text("filename")
+    if not folder.has(name, shape.where):
+        raise SceneFileError(f"{shape.where}: {name!r:.80} is not there")
+    reader = read_obj if shape.type == "obj" else read_ply
+    said = Warnings()
+    try:
+        scene = reader(path.parent / name, said)
+    except SceneFileError as error:
+        raise SceneFileError(f"{shape.where}: {name!r:.80}: {error}") from error
+    for line in scene.warnings:
+        # What the file says of materials does not count: the scene has its own.
+        if "material" not in line and "mtl" not in line and "texture" not in line:
+            warnings.add(f"{name!r:.80}: {line}")
+    meshes = scene.meshes
+    if not meshes:
+        raise SceneFileError(f"{shape.where}: {name!r:.80} has no triangles")
+    surface = _joined(meshes)
+    if shape.type == "ply" and surface.uv is not None:
+        # Our reader turns PLY's v over, as most programs that write PLY mean it; Mitsuba does not.
+        surface = replace(surface, uv=surface.uv * np.float32((1, -1)) + np.float32((0, 1)))
+    flipped = shape.flag("flip_tex_coords", shape.type == "obj")
+    if flipped != (shape.type == "obj") and surface.uv is not None:
+        surface = replace(surface, uv=surface.uv * np.float32((1, -1)) + np.float32((0, 1)))
+    if shape.flag("face_normals", False):
+        return replace(surface, normals=None)
+    return _smoothed(surface) if _is_flat(surface) else surface
+
+
+def _joined(meshes: tuple[Mesh, ...]) -> Surface:
+    starts = np.cumsum([0] + [len(mesh.positions) for mesh in meshes])
+    triangles = [mesh.triangles + start for mesh, start in zip(meshes, starts, strict=False)]
+    return Surface(
+        np.concatenate([mesh.positions for mesh in meshes]),
+        np.concatenate(triangles).astype(np.int64),
+        np.concatenate([mesh.normals for mesh in meshes]),
+        np.concatenate([mesh.uv for mesh in meshes]),
+    )
+
+
+def _is_flat(surface: Surface) -> bool:
+    """Whether every corner has its triangle's normal, as our readers give it where a file has none."""
+    return len(surface.positions) == surface.triangles.size and bool(
+        (surface.normals[surface.triangles] == surface.normals[surface.triangles[:, :1]]).all()
+    )
+
+
+def _smoothed(surface: Surface) -> Surface:
+    """Vertices of one place and texture coordinate joined, with normals weighted by angle.
+
+    Thürmer and Wüthrich 1998, which Mitsuba does to files without normals.
+    """
+    keys = np.concatenate([surface.positions, surface.uv], axis=1)
+    _, first, vertex = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    triangles = vertex.reshape(-1)[surface.triangles]
+    corners = surface.positions[surface.triangles].astype(np.float64)
+    normals = np.zeros((len(first), 3))
+    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    face /= np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-300)
+    for corner in range(3):
+        to_next = corners[:, (corner + 1) % 3] - corners[:, corner]
+        to_last = corners[:, (corner + 2) % 3] - corners[:, corner]
+        sine = np.linalg.norm(np.cross(to_next, to_last), axis=1)
+        angle = np.arctan2(sine, (to_next * to_last).sum(axis=1))
+        np.add.at(normals, triangles[:, corner], angle[:, None] * face)
+    return Surface(surface.positions[first], triangles, normals.astype(np.float32), surface.uv[first])
+
+
+def _rectangle(shape: Plugin) -> Shape:
+    corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float64)
+    triangles = np.array([[0, 1, 2], [0, 2, 3]])
+    normals = np.tile((0.0, 0.0, 1.0), (4, 1))
+    return Shape(_surface(corners, triangles, normals, (corners[:, :2] + 1.0) / 2.0), np.eye(4))
+
+
+def _cube(shape: Plugin) -> Shape:
+    """Six faces, with the texture coordinates that Mitsuba's cube has."""
+    uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float64)
+    faces = np.array(
+        [
+            [[1, -1, -1], [1, -1, 1], [-1, -1, 1], [-1, -1, -1]],
+            [[1, 1, -1], [-1, 1, -1], [-1, 1, 1], [1, 1, 1]],
+            [[1, -1, -1], [1, 1, -1], [1, 1, 1], [1, -1, 1]],
+            [[1, -1, 1], [1, 1, 1], [-1, 1, 1], [-1, -1, 1]],
+            [[-1, -1, 1], [-1, 1, 1], [-1, 1, -1], [-1, -1, -1]],
+            [[1, 1, -1], [1, -1, -1], [-1, -1, -1], [-1, 1, -1]],
+        ],
+        np.float64,
+    )
+    starts = 4 * np.arange(6)[:, None, None]
+    triangles = (starts + np.array([[0, 1, 2], [3, 0, 2]])).reshape(-1, 3)
+    normals = np.repeat(faces.mean(axis=1), 4, axis=0)
+    return Shape(_surface(faces.reshape(-1, 3), triangles, normals, np.tile(uv, (6, 1))), np.eye(4))
+
+
+def _sphere(shape: Plugin) -> Shape:
+    u, v = np.meshgrid(np.arange(_SIDES + 1) / _SIDES, np.arange(_SIDES // 2 + 1) / (_SIDES // 2))
+    azimuth, polar = 2.0 * np.pi * u, np.pi * v
+    points = np.stack(
+        [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], axis=-1
+    ).reshape(-1, 3)
+    uv = np.stack([u, v], axis=-1).reshape(-1, 2)
+    to_shape = np.diag([*[shape.number("radius", 1.0)] * 3, 1.0])
+    to_shape[:3, 3] = shape.vector("center", (0.0, 0.0, 0.0))
+    # Polar angle runs down, azimuth to the left seen from outside.
+    return Shape(
+        _surface(points, _grid(_SIDES // 2, _SIDES)[:, ::-1], points, uv), _invertible(to_shape, shape)
+    )
+
+
+def _disk(shape: Plugin) -> Shape:
+    radius, turn = np.meshgrid([0.0, 1.0], np.arange(_SIDES + 1) / _SIDES)
+    angle = 2.0 * np.pi * turn
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle], axis=-1).reshape(-1, 3)
+    uv = np.stack([radius, turn], axis=-1).reshape(-1, 2)
+    normals = np.tile((0.0, 0.0, 1.0), (len(points), 1))
+    return Shape(_surface(points, _grid(_SIDES, 1), normals, uv), np.eye(4))
+
+
+def _cylinder(shape: Plugin) -> Shape:
+    """Open at both ends, from p0 to p1."""
+    start, end = shape.vector("p0", (0.0, 0.0, 0.0)), shape.vector("p1", (0.0, 0.0, 1.0))
+    turn, height = np.meshgrid(np.arange(_SIDES + 1) / _SIDES, [0.0, 1.0])
+    angle = 2.0 * np.pi * turn
+    points = np.stack([np.cos(angle), np.sin(angle), height], axis=-1).reshape(-1, 3)
+    uv = np.stack([turn, height], axis=-1).reshape(-1, 2)
+    axis, radius = end - start, shape.number("radius", 1.0)
+    length = float(np.linalg.norm(axis))
+    side = np.zeros(3)
+    side[np.argmin(np.abs(axis))] = 1.0
+    across = np.cross(side, axis)
+    across /= max(float(np.linalg.norm(across)), 1e-300)
+    to_shape = np.eye(4)
+    if start[0] == start[1] == end[0] == end[1] == 0.0 < end[2] - start[2]:
+        across = np.array([1.0, 0.0, 0.0])
+    to_shape[:3, 0], to_shape[:3, 2], to_shape[:3, 3] = radius * across, axis, start
+    to_shape[:3, 1] = radius * np.cross(axis / max(length, 1e-300), across)
+    normals = points * (1.0, 1.0, 0.0)
+    return Shape(_surface(points, _grid(1, _SIDES), normals, uv), _invertible(to_shape, shape))
+
+
+def _invertible(matrix: Float64[np.ndarray, "4 4"], shape: Plugin) -> Float64[np.ndarray, "4 4"]:
+    if not abs(np.linalg.det(matrix[:3, :3])) > 0.0:
+        raise SceneFileError(f"{shape.where}: must have a radius and a length above zero")
+    return matrix
+
+
+def _grid(rows: int, columns: int) -> Int64[np.ndarray, "triangles 3"]:
+    """Two triangles for each cell of a grid of (rows + 1) × (columns + 1) vertices."""
+    first = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).reshape(-1, 1)
+    up = columns + 1
+    return np.concatenate([first + np.array([0, 1, up + 1]), first + np.array([0, up + 1, up])]).astype(
+        np.int64
+    )
+
+
+def _surface(
+    positions: Float64[np.ndarray, "n 3"],
+    triangles: Int64[np.ndarray, "t 3"],
+    normals: Float64[np.ndarray, "n 3"],
+    uv: Float64[np.ndarray, "n 2"],
+) -> Surface:
+    def single(values: np.ndarray) -> Float32[np.ndarray, "n _"]:
+        return values.astype(np.float32)
+
+    return Surface(single(positions), np.ascontiguousarray(triangles), single(normals), single(uv))
+
+
+_ANALYTIC: dict[str, Callable[[Plugin], Shape]] = {
+    "rectangle": _rectangle,
+    "cube": _cube,
+    "sphere": _sphere,
+    "disk": _disk,
+    "cylinder": _cylinder,
+}

@@ -1,0 +1,86 @@
+"""Numbers, vectors and colours as Mitsuba writes them into attributes."""
+
+import math
+import re
+
+import numpy as np
+from jaxtyping import Float64
+
+from vpltune.renderer.files.srgb import linear_from_srgb
+from vpltune.renderer.scene.files.diagnostics import SceneFileError
+from vpltune.renderer.scene.mitsuba_import.xml_tree import XmlNode
+
+_LARGEST = 1e30
+# Where the eye's three kinds of cones are most apart: over these, a sampled spectrum is averaged [nm].
+_BANDS = ((580.0, 680.0), (490.0, 580.0), (420.0, 490.0))
+
+
+def attribute(node: XmlNode, key: str) -> str:
+    """A required attribute.
+
+    Raises:
+        SceneFileError: it is missing.
+    """
+    if key not in node.attributes:
+        raise SceneFileError(f"{node.where}: attribute '{key}' is missing")
+    return node.attributes[key]
+
+
+def numbers(node: XmlNode, key: str, count: int) -> Float64[np.ndarray, " count"]:
+    """`count` numbers from an attribute, separated by spaces or commas.
+
+    Raises:
+        SceneFileError: there are more or fewer, or one is not finite.
+    """
+    words = attribute(node, key).replace(",", " ").split()
+    try:
+        found = [float(word) for word in words]
+    except ValueError:
+        found = [math.nan]
+    if len(found) != count or not all(abs(number) <= _LARGEST for number in found):
+        plural = "s" * (count > 1)
+        raise SceneFileError(
+            f"{node.where}: {key} must be {count} finite number{plural}, got {node.attributes[key]!r:.60}"
+        )
+    return np.array(found, np.float64)
+
+
+def vector(node: XmlNode, absent: float) -> Float64[np.ndarray, "3"]:
+    """From `value` (three numbers, or one for all), or from `x`, `y` and `z`; `absent` where not given."""
+    if "value" in node.attributes:
+        count = len(node.attributes["value"].replace(",", " ").split())
+        return np.broadcast_to(numbers(node, "value", 1 if count == 1 else 3), 3).copy()
+    return np.array([numbers(node, axis, 1)[0] if axis in node.attributes else absent for axis in "xyz"])
+
+
+def color(node: XmlNode) -> Float64[np.ndarray, "3"]:
+    """Linear red, green and blue of an <rgb>, <srgb> or <spectrum> element.
+
+    Raises:
+        SceneFileError: it cannot be read, or is negative.
+    """
+    text = attribute(node, "value").strip()
+    if re.fullmatch(r"#[0-9a-fA-F]{6}", text):
+        encoded = np.array([int(text[i : i + 2], 16) / 255.0 for i in (1, 3, 5)])
+        return linear_from_srgb(encoded)
+    if node.tag == "spectrum" and ":" in text:
+        found = _sampled_spectrum(node, text)
+    else:
+        count = len(text.replace(",", " ").split())
+        found = np.broadcast_to(numbers(node, "value", 1 if count == 1 else 3), 3).copy()
+    if (found < 0.0).any():
+        raise SceneFileError(f"{node.where}: a colour must not be negative, got {text!r:.60}")
+    return linear_from_srgb(found) if node.tag == "srgb" else found
+
+
+def _sampled_spectrum(node: XmlNode, text: str) -> Float64[np.ndarray, "3"]:
+    try:
+        pairs = np.array(
+            [[float(part) for part in word.split(":")] for word in text.replace(",", " ").split()]
+        )
+    except ValueError:
+        pairs = np.full((1, 2), math.nan)
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or not (np.abs(pairs) <= _LARGEST).all():
+        raise SceneFileError(f"{node.where}: a spectrum is wavelength:value pairs, got {text!r:.60}")
+    pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
+    return np.array([np.interp(np.linspace(*band, 16), pairs[:, 0], pairs[:, 1]).mean() for band in _BANDS])

@@ -1,0 +1,217 @@
+"""A camera for a scene that has none, chosen by what it sees.
+
+In a scene that is a room the camera stands inside, or before the open side if there is one. Anything else is
+an object, looked at from outside. Up is +Y, as in glTF.
+"""
+
+import math
+
+import numpy as np
+from jaxtyping import Float64
+
+from vpltune.renderer.scene.placement.free_places import (
+    FROM_FRONT,
+    PLACE_DIRECTIONS,
+    Places,
+    free_places,
+    height_fraction,
+    is_room,
+)
+from vpltune.renderer.scene.placement.free_space import FreeSpace, free_space, sphere_directions
+from vpltune.renderer.scene.placement.sight import MIDDLE_RAYS, front_facing, lit_fraction, seen_by
+from vpltune.renderer.scene.scene import Camera, Light, Scene, look_at
+
+YFOV = math.radians(62.0)
+OBJECT_YFOV = math.radians(40.0)
+FINALISTS = 32
+# A side is open where nearly all rays through it meet a surface, most of them well inside.
+OPENING_HITS, OPENING_DEPTH = 0.95, 0.4
+# What is nearer than this share of the grid's diagonal stands in the way of the view.
+NEAR = 0.12
+# Of a given light's reach, more than this share of the picture adds nothing.
+ENOUGH_LIT = 0.45
+
+
+def default_camera(scene: Scene) -> tuple[Camera, str]:
+    """A camera that shows much of the scene, and a sentence that says where it stands and why."""
+    candidates, where = _cameras(free_space(scene))
+    camera = max(candidates, key=lambda candidate: candidate[0])[1]
+    return camera, _camera_note(camera, where)
+
+
+def default_camera_for_lights(scene: Scene, lights: tuple[Light, ...]) -> tuple[Camera, str]:
+    """As `default_camera`, but of the good views the one that sees most of what these lights light."""
+    space = free_space(scene)
+    candidates, where = _cameras(space)
+    shares = [lit_fraction(space, seen_by(space, camera), lights) for _, camera in candidates]
+    # As good a picture at half the lit share counts for as much as half as good a picture all lit.
+    scores = [
+        round(score * min(share, ENOUGH_LIT), 9) for (score, _), share in zip(candidates, shares, strict=True)
+    ]
+    best = int(np.argmax(scores))
+    camera = candidates[best][1]
+    reached = f"the given light reaches {100.0 * shares[best]:.0f} % of what it sees"
+    return camera, f"{_camera_note(camera, where)}; {reached}"
+
+
+def _camera_note(camera: Camera, where: str) -> str:
+    eye = ", ".join(f"{coordinate:.4g}" for coordinate in camera.position_world)
+    return f"camera chosen automatically: {where}, at ({eye}), {math.degrees(camera.yfov):.0f}° vertical"
+
+
+def _cameras(space: FreeSpace) -> tuple[list[tuple[float, Camera]], str]:
+    """Good cameras with their scores, and in words where they stand."""
+    if not is_room(space):
+        return _cameras_outside(space), "outside, in a three-quarter view of the whole"
+    before_opening = _cameras_before_openings(space)
+    if before_opening:
+        return before_opening, "before the open side, looking in"
+    return _cameras_inside(space, free_places(space)), "inside, where much is seen"
+
+
+def _cameras_inside(space: FreeSpace, places: Places) -> list[tuple[float, Camera]]:
+    """The best of all level and slightly lowered views from the free places.
+
+    Wanted: all rays hit, from the front; far and varied depth; nothing close before the lens; a walled-in
+    place; eye height. Each is a factor; the few best are looked at again with a whole picture's rays.
+    """
+    looks, inside = _looks()
+    count = inside.sum(axis=1)
+    hit_share = places.hit @ inside.T / count
+    front_share = places.front @ inside.T / count
+    depth = np.maximum(places.distance, 0.5)
+    hits = np.maximum(places.hit @ inside.T, 1.0)
+    log_depth = np.where(places.hit, np.log(depth), 0.0)
+    mean_log = log_depth @ inside.T / hits
+    spread = np.sqrt(np.maximum(log_depth**2 @ inside.T / hits - mean_log**2, 0.0))
+    diagonal = float(np.linalg.norm(space.shape))
+    # The square root of the area seen, its tilt aside.
+    reach = np.sqrt(np.where(places.front, depth**2, 0.0) @ inside.T / count) / diagonal
+    near = (places.hit & (places.distance < NEAR * diagonal)) @ inside.T / count
+    # A place with the front of a surface all round is in a room; one with a fifth of it open still serves, as
+    # in a box without a front wall.
+    indoors = np.minimum(places.front.mean(axis=1) / 0.8, 1.0) ** 4
+    place_weight = indoors * _eye_height_weight(space, places.positions)
+    score = (
+        hit_share**3
+        * (0.05 + front_share**2)
+        * reach
+        * (1.0 + np.minimum(spread, 0.5))
+        * (1.0 - near) ** 3
+        * place_weight[:, None]
+    )
+    best = np.argsort(-np.round(score, 9).ravel(), kind="stable")[:FINALISTS]
+    finalists = []
+    for flat in best:
+        place, look = divmod(int(flat), len(looks))
+        eye = space.to_world(places.positions[place])
+        camera = Camera(look_at(eye, eye + space.voxel_world * looks[look]), YFOV)
+        finalists.append((round(_picture_score(space, camera) * float(place_weight[place]), 9), camera))
+    return finalists
+
+
+def _looks() -> tuple[Float64[np.ndarray, "looks 3"], Float64[np.ndarray, "looks directions"]]:
+    """View directions all round, and which sphere directions (as 0 or 1) lie in the 4:3 picture of each."""
+    directions = sphere_directions(PLACE_DIRECTIONS)
+    looks, inside = [], []
+    for pitch in np.radians([-4.0, -16.0]):
+        for azimuth in 2.0 * math.pi * np.arange(24) / 24:
+            look = np.array(
+                [math.cos(pitch) * math.sin(azimuth), math.sin(pitch), -math.cos(pitch) * math.cos(azimuth)]
+            )
+            local = directions @ look_at(np.zeros(3), look)[:3, :3]
+            tangent = local[:, :2] / np.maximum(-local[:, 2:], 1e-6)
+            limit = math.tan(0.5 * YFOV)
+            ahead = local[:, 2] < 0.0
+            inside.append(
+                ahead & (np.abs(tangent[:, 0]) < limit * 4.0 / 3.0) & (np.abs(tangent[:, 1]) < limit)
+            )
+            looks.append(look)
+    return np.array(looks), np.array(inside, np.float64)
+
+
+def _picture_score(space: FreeSpace, camera: Camera) -> float:
+    """How much surface a picture shows from its front, at what variety of depths, with nothing in the way."""
+    sight = seen_by(space, camera)
+    hit = sight.hits.hit
+    if not hit.any():
+        return 0.0
+    rays = (sight.points[hit] - space.to_voxels(camera.position_world)) / np.maximum(
+        sight.hits.distance[hit], 1e-6
+    )[:, None]
+    distance = sight.hits.distance[hit]
+    normals = space.normals.reshape(-1, 3)[sight.hits.voxel[hit]]
+    front = front_facing(space, sight.hits.voxel[hit], rays)
+    # Surface per ray is d²/cos θ; the bound on cos θ keeps a floor seen lengthwise from counting for all.
+    tilt = np.maximum(np.abs((normals * rays).sum(axis=1)), 0.3)
+    seen = math.sqrt(float(np.where(front, distance**2 / tilt, 0.0).sum()) / hit.size)
+    near = float((distance < NEAR * np.linalg.norm(space.shape)).sum()) / hit.size
+    spread = float(np.std(np.log(np.maximum(distance, 0.5))))
+    # Into the depth of the room rather than past a corner of it.
+    middle = sight.hits.distance[MIDDLE_RAYS]
+    depth_ahead = float(np.where(np.isfinite(middle), middle, 0.0).mean() / np.median(distance))
+    return (
+        sight.hit_fraction**3
+        * seen
+        * (1.0 + min(spread, 0.5))
+        * (1.0 - near) ** 3
+        * min(max(depth_ahead, 0.5), 1.4)
+    )
+
+
+def _eye_height_weight(space: FreeSpace, positions: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, " n"]:
+    """1 from 0.3 to 0.6 of the way from floor to ceiling, falling to 0.3 either side and without a floor."""
+    fraction = height_fraction(space, positions)
+    outside = np.maximum(0.3 - fraction, 0.0) + np.maximum(fraction - 0.6, 0.0)
+    return np.where(fraction > 0.0, np.maximum(1.0 - 2.0 * outside, 0.3), 0.3)
+
+
+def _cameras_before_openings(space: FreeSpace) -> list[tuple[float, Camera]]:
+    """Level views into a room through open sides, as into a stage or a Cornell box; often none."""
+    occupied = np.argwhere(space.occupied) + 0.5
+    low, high = occupied.min(axis=0), occupied.max(axis=0)
+    target, extent = 0.5 * (low + high), high - low
+    cameras = []
+    for axis, across in ((2, 0), (0, 2)):
+        # The open side just fills the picture's height or width, whichever is first.
+        fitting = 0.5 * min(extent[1], extent[across] * 3.0 / 4.0) / math.tan(0.5 * OBJECT_YFOV)
+        for side in (1.0, -1.0):
+            back = np.zeros(3)
+            back[axis] = side
+            eye = target + (0.5 * extent[axis] + 0.97 * fitting) * back
+            camera = Camera(look_at(space.to_world(eye), space.to_world(target)), OBJECT_YFOV)
+            sight = seen_by(space, camera)
+            hit = sight.hits.hit
+            rays = (sight.points - eye) / np.maximum(sight.hits.distance, 1e-6)[:, None]
+            front = hit & front_facing(space, sight.hits.voxel, np.where(hit[:, None], rays, 0.0))
+            # How far in behind the open side, as a share of the way through.
+            depth = (0.5 * extent[axis] - (sight.points - target) @ back) / extent[axis]
+            inward = float(np.median(depth[front])) if front.any() else 0.0
+            if hit.mean() > OPENING_HITS and front.mean() > FROM_FRONT and inward > OPENING_DEPTH:
+                cameras.append((round(inward * float(front.mean()), 9), camera))
+    return cameras
+
+
+def _cameras_outside(space: FreeSpace) -> list[tuple[float, Camera]]:
+    """Three-quarter views from all round, framing the bounds."""
+    occupied = np.argwhere(space.occupied) + 0.5
+    target = 0.5 * (occupied.min(axis=0) + occupied.max(axis=0))
+    cameras = []
+    for elevation in np.radians([22.0, 35.0]):
+        for azimuth in 2.0 * math.pi * (np.arange(8) + 0.5) / 8:
+            back = np.array(
+                [
+                    math.cos(elevation) * math.sin(azimuth),
+                    math.sin(elevation),
+                    math.cos(elevation) * math.cos(azimuth),
+                ]
+            )
+            rotation = look_at(back, np.zeros(3))[:3, :3]
+            local = (occupied - target) @ rotation
+            tan_y = math.tan(0.5 * OBJECT_YFOV)
+            # Far enough for every voxel to be in the picture: z + |y|/tan and z + |x|/(tan · 4/3).
+            reach = np.maximum(np.abs(local[:, 1]) / tan_y, np.abs(local[:, 0]) / (tan_y * 4.0 / 3.0))
+            distance = 1.02 * float((reach + local[:, 2]).max())
+            eye = space.to_world(target + distance * back)
+            cameras.append(Camera(look_at(eye, space.to_world(target)), OBJECT_YFOV))
+    return [(round(_picture_score(space, camera), 9), camera) for camera in cameras]

@@ -1,0 +1,191 @@
+"""A spot light for a scene that has none, chosen by what it reaches and what the camera sees of that.
+
+In a scene that is a room the light hangs inside, high up; an object is lit from outside. Up is +Y.
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+from jaxtyping import Float64
+
+from vpltune.renderer.scene.placement.free_places import CLEARANCE, PLACES, height_fraction, is_room
+from vpltune.renderer.scene.placement.free_space import (
+    FreeSpace,
+    free_space,
+    march_rays,
+    marched,
+    sphere_directions,
+)
+from vpltune.renderer.scene.placement.sight import (
+    MIDDLE_RAYS,
+    SAME_PLACE,
+    Sight,
+    light_hits,
+    march_from,
+    mean_square_distance_world,
+    seen_by,
+)
+from vpltune.renderer.scene.scene import Camera, Light, Scene
+
+# Half angles, inner and outer.
+ROOM_CONE = (math.radians(35.0), math.radians(55.0))
+OBJECT_CONE = (math.radians(18.0), math.radians(27.0))
+CONE_DIRECTIONS = 512
+# A light is best where this much of the picture is lit directly: the rest shows what bounces.
+BEST_LIT = 0.45
+# What is nearer to a light than this share of the root mean square distance of what it meets burns out.
+BURNT = 0.45
+# W/m² at the root mean square distance of what the light meets, in each channel.
+MEAN_IRRADIANCE = math.pi
+
+
+def default_light(scene: Scene, camera: Camera) -> tuple[Light, str]:
+    """A spot light that lights part of what the camera sees, and a sentence that says where and why."""
+    space = free_space(scene)
+    sight = seen_by(space, camera)
+    positions, axes, (inner_cone, outer_cone) = _light_candidates(space, camera, sight)
+    chosen, axis, lit_share = _best_spot(space, sight, positions, axes, outer_cone)
+    light = _spot(space, space.to_world(positions[chosen]), axes[chosen, axis], inner_cone, outer_cone)
+    place = ", ".join(f"{coordinate:.4g}" for coordinate in light.position_world)
+    return light, (
+        f"light chosen automatically: a {2.0 * math.degrees(outer_cone):.0f}° spot at ({place}), which lights"
+        f" {100.0 * lit_share:.0f} % of what the camera sees; the rest shows the indirect light"
+    )
+
+
+def _spot(
+    space: FreeSpace,
+    position_world: Float64[np.ndarray, "3"],
+    direction_world: Float64[np.ndarray, "3"],
+    inner_cone: float,
+    outer_cone: float,
+) -> Light:
+    """A spot of π W/m² at the root mean square distance of what it meets, whatever the scale of the scene."""
+    dark = Light(
+        "spot", np.zeros(3), position_world, direction_world, inner_cone, outer_cone, "automatic spot"
+    )
+    intensity = MEAN_IRRADIANCE * mean_square_distance_world(space, light_hits(space, dark))
+    return dataclasses.replace(dark, intensity=np.full(3, intensity))
+
+
+def _light_candidates(
+    space: FreeSpace, camera: Camera, sight: Sight
+) -> tuple[Float64[np.ndarray, "n 3"], Float64[np.ndarray, "n axes 3"], tuple[float, float]]:
+    """Positions (voxel units), the axes to try at each, and the inner and outer cone."""
+    eye = space.to_voxels(camera.position_world)
+    seen = sight.points[sight.hits.hit]
+    center = np.median(seen, axis=0) if len(seen) else 0.5 * np.array(space.shape, np.float64)
+    if is_room(space):
+        positions = _places_in_view(space, eye, center)
+        axes = [_tilted(0.0, 0.0)]
+        axes += [_tilted(math.radians(40.0), azimuth) for azimuth in 2.0 * math.pi * np.arange(8) / 8]
+        return positions, np.tile(np.array(axes), (len(positions), 1, 1)), ROOM_CONE
+    positions = _places_around(space, eye, center)
+    towards = center - positions
+    return positions, (towards / np.linalg.norm(towards, axis=1, keepdims=True))[:, None, :], OBJECT_CONE
+
+
+def _tilted(tilt: float, azimuth: float) -> Float64[np.ndarray, "3"]:
+    """A direction `tilt` away from straight down."""
+    return np.array([math.sin(tilt) * math.cos(azimuth), -math.cos(tilt), math.sin(tilt) * math.sin(azimuth)])
+
+
+def _places_in_view(
+    space: FreeSpace, eye: Float64[np.ndarray, "3"], center: Float64[np.ndarray, "3"]
+) -> Float64[np.ndarray, "n 3"]:
+    """Free places in sight of the eye, the nearest to what it sees, high up in the room if it can be."""
+    index = np.argwhere(space.clearance >= CLEARANCE)
+    positions = index[:: max(1, -(-len(index) // (2 * PLACES)))] + 0.5
+    offset = positions - eye
+    distance = np.linalg.norm(offset, axis=1)
+    hits = march_from(space, eye, offset / np.maximum(distance, 1e-9)[:, None])
+    in_sight = hits.distance > distance
+    positions = positions[in_sight] if in_sight.any() else eye[None, :]
+    fraction = height_fraction(space, positions)
+    high = (fraction > 0.6) & (fraction < 0.93)
+    if high.any():
+        positions = positions[high]
+    near = np.argsort(np.round(np.linalg.norm(positions - center, axis=1), 6), kind="stable")
+    near = near[: max(160, len(near) // 3)]
+    return positions[near[:: max(1, len(near) // 80)]]
+
+
+def _places_around(
+    space: FreeSpace, eye: Float64[np.ndarray, "3"], center: Float64[np.ndarray, "3"]
+) -> Float64[np.ndarray, "n 3"]:
+    """Places outside an object: above it, to either side of the camera's view, as far away as it is long."""
+    reach = 0.8 * float(np.linalg.norm(space.shape))
+    back = eye - center
+    azimuth = math.atan2(back[0], back[2])
+    return np.array(
+        [
+            center
+            + reach
+            * np.array(
+                [
+                    math.cos(elevation) * math.sin(azimuth + turn),
+                    math.sin(elevation),
+                    math.cos(elevation) * math.cos(azimuth + turn),
+                ]
+            )
+            for turn in np.radians([45.0, -45.0, 80.0, -80.0, 120.0, -120.0])
+            for elevation in np.radians([35.0, 50.0])
+        ]
+    )
+
+
+def _best_spot(
+    space: FreeSpace,
+    sight: Sight,
+    positions: Float64[np.ndarray, "n 3"],
+    axes: Float64[np.ndarray, "n axes 3"],
+    outer_cone: float,
+) -> tuple[int, int, float]:
+    """Index of position and axis of the best spot, and the share of the picture that it lights.
+
+    Wanted: the cone meets surfaces; none of them is close by, which would burn out; and part of the picture
+    is lit, its middle rather than its rim, and part not.
+    """
+    directions = sphere_directions(CONE_DIRECTIONS)
+    around = marched(space, positions, directions)
+    in_cone = (axes @ directions.T > math.cos(outer_cone)).astype(np.float64)
+    square = np.where(around.hit, around.distance, 0.0) ** 2
+    count = in_cone.sum(axis=2)
+    hits = np.einsum("nad,nd->na", in_cone, around.hit.astype(np.float64))
+    mean_square = np.einsum("nad,nd->na", in_cone, square) / np.maximum(hits, 1.0)
+    burnt = around.hit[:, None, :] & (square[:, None, :] < BURNT**2 * mean_square[:, :, None])
+    burnt_share = (in_cone * burnt).sum(axis=2) / np.maximum(hits, 1.0)
+    seen, in_middle = sight.points[sight.hits.hit], np.zeros(len(sight.points), bool)
+    in_middle[MIDDLE_RAYS] = True
+    lit_share = _lit_shares(space, seen[::4], positions, axes, outer_cone)
+    middle_share = _lit_shares(space, sight.points[in_middle & sight.hits.hit], positions, axes, outer_cone)
+    wanted = np.exp(-(((lit_share - BEST_LIT) / 0.2) ** 2))
+    # Every light scores something, so that where none is good the least bad one is taken.
+    score = (
+        (hits / count) ** 2
+        * (1.0 - burnt_share) ** 2
+        * (0.02 + wanted)
+        * (0.3 + np.minimum(middle_share, 0.7))
+    )
+    place, axis = np.unravel_index(int(np.round(score, 9).argmax()), score.shape)
+    return int(place), int(axis), float(lit_share[place, axis])
+
+
+def _lit_shares(
+    space: FreeSpace,
+    points: Float64[np.ndarray, "points 3"],
+    positions: Float64[np.ndarray, "n 3"],
+    axes: Float64[np.ndarray, "n axes 3"],
+    outer_cone: float,
+) -> Float64[np.ndarray, "n axes"]:
+    """Share of surface points that a spot at each position, along each of its axes, lights."""
+    if not len(points):
+        return np.zeros(axes.shape[:2])
+    offset = points[None, :, :] - positions[:, None, :]
+    distance = np.linalg.norm(offset, axis=2)
+    towards = offset / np.maximum(distance, 1e-9)[:, :, None]
+    origins = np.repeat(positions, len(points), axis=0)
+    reached = march_rays(space, origins, towards.reshape(-1, 3)).distance >= distance.ravel() - SAME_PLACE
+    in_cone = axes @ towards.transpose(0, 2, 1) > math.cos(outer_cone)
+    return (in_cone & reached.reshape(distance.shape)[:, None, :]).mean(axis=2)

@@ -1,0 +1,190 @@
+"""Where camera and lights come from: flags, the small TOML beside the scene, the file, an automatic choice.
+
+The sidecar of `room.glb` is `room.vpltune.toml`; lengths in world units, angles in degrees::
+
+    [camera]
+    eye = [3.6, 2.7, -1.7]
+    look_at = [-2.0, 1.7, 0.9]
+    yfov_degrees = 65.0
+
+    [[light]]
+    type = "spot"               # or "point", "directional"
+    position = [0.3, 3.3, 0.2]  # not for a directional light
+    look_at = [0.0, 0.0, 0.3]   # or direction = [x, y, z], the way the light travels; not for a point light
+    intensity = 10.0            # W/sr (spot, point) or W/m² (directional): one number, or red, green, blue
+    inner_cone_degrees = 35.0   # half angles, spot only
+    outer_cone_degrees = 55.0
+"""
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64
+
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.scene.placement.automatic_camera import default_camera, default_camera_for_lights
+from vpltune.renderer.scene.placement.automatic_light import default_light
+from vpltune.renderer.scene.placement.free_space import free_space
+from vpltune.renderer.scene.placement.sight import lit_fraction, seen_by
+from vpltune.renderer.scene.scene import Camera, Light, Scene, look_at
+from vpltune.renderer.scene.views import check_cone
+
+DEFAULT_YFOV_DEGREES = 60.0
+DEFAULT_CONE_DEGREES = {"inner_cone_degrees": 35.0, "outer_cone_degrees": 55.0}
+CAMERA_KEYS = ("eye", "look_at", "yfov_degrees")
+LIGHT_KEYS = {
+    "spot": ("type", "position", "direction", "look_at", "intensity", *DEFAULT_CONE_DEGREES),
+    "point": ("type", "position", "intensity"),
+    "directional": ("type", "direction", "look_at", "position", "intensity"),
+}
+# A file's lights that reach less of the picture than this light nothing that can be seen.
+LEAST_LIT = 0.005
+
+
+def sidecar_path(scene_path: Path) -> Path:
+    """Where the sidecar of a scene lies, whether or not it exists."""
+    return Path(scene_path).with_suffix(".vpltune.toml")
+
+
+def read_sidecar(path: Path) -> tuple[Camera | None, tuple[Light, ...] | None]:
+    """The camera and the lights a sidecar gives; None for what it does not mention.
+
+    Raises:
+        InputError: it cannot be read, is not TOML, has an unknown key, or a value that is not as it must be.
+    """
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+    except ValueError as error:
+        raise InputError(f"{path}: not TOML ({error})") from error
+    _check_keys(document, ("camera", "light"), str(path))
+    camera = _camera(document["camera"], f"{path}: [camera]") if "camera" in document else None
+    if "light" not in document:
+        return camera, None
+    entries = document["light"]
+    if not isinstance(entries, list) or not entries:
+        raise InputError(f"{path}: lights must be written as [[light]] tables")
+    return camera, tuple(_light(entry, f"{path}: [[light]] {i}") for i, entry in enumerate(entries))
+
+
+def resolve_camera_and_lights(
+    scene: Scene,
+    scene_path: Path,
+    camera_override: Camera | None,
+    light_override: tuple[Light, ...] | None,
+) -> tuple[Camera, tuple[Light, ...], tuple[str, ...]]:
+    """The camera and lights to use, and a sentence for each thing that the user did not say in so many words.
+
+    Raises:
+        InputError: the sidecar is there and cannot be used, or the scene has no surfaces.
+    """
+    if not scene.triangle_count():
+        raise InputError(f"{scene_path}: a scene must have at least one triangle, got none")
+    path = sidecar_path(scene_path)
+    camera, lights = read_sidecar(path) if path.exists() else (None, None)
+    notes = []
+    if path.exists() and (camera_override is None or light_override is None):
+        notes.append(f"{' and '.join(_mentioned(camera, lights))} taken from {path.name}")
+    camera = camera_override or camera
+    lights = light_override if light_override is not None else lights
+    if camera is None and scene.cameras:
+        camera = scene.cameras[0]
+        if len(scene.cameras) > 1:
+            notes.append(f"the file has {len(scene.cameras)} cameras; the first one is used")
+    own_lights = lights is not None
+    lights = lights if own_lights else scene.lights
+    if camera is None:
+        camera, note = default_camera_for_lights(scene, lights) if lights else default_camera(scene)
+        notes.append(note)
+    if own_lights:
+        return camera, lights, tuple(notes)
+    if lights:
+        space = free_space(scene)
+        if lit_fraction(space, seen_by(space, camera), lights) >= LEAST_LIT:
+            return camera, lights, tuple(notes)
+        notes.append(
+            f"the file's {'light reaches' if len(lights) == 1 else 'lights reach'} nothing the camera sees"
+        )
+    light, note = default_light(scene, camera)
+    return camera, (light,), (*notes, note)
+
+
+def _mentioned(camera: Camera | None, lights: tuple[Light, ...] | None) -> list[str]:
+    named = [name for name, value in (("camera", camera), ("lights", lights)) if value is not None]
+    return named or ["nothing"]
+
+
+def _check_keys(table: Any, allowed: tuple[str, ...], where: str) -> None:
+    if not isinstance(table, dict):
+        raise InputError(f"{where}: must be a table, got {type(table).__name__}")
+    for key in table:
+        if key not in allowed:
+            raise InputError(f"{where}: unknown key '{key}'; known are {', '.join(allowed)}")
+
+
+def _numbers(
+    table: dict[str, Any], key: str, counts: tuple[int, ...], where: str
+) -> Float64[np.ndarray, " n"]:
+    if key not in table:
+        raise InputError(f"{where}: key '{key}' is missing")
+    value = table[key]
+    items = value if isinstance(value, list) else [value]
+    # bool is an int to Python; TOML has inf and nan, and numbers too large for float32 would become them.
+    plain = all(isinstance(item, int | float) and not isinstance(item, bool) for item in items)
+    if not plain or len(items) not in counts or not all(abs(item) <= 1e30 for item in items):
+        wanted = " or ".join(str(count) for count in counts)
+        raise InputError(
+            f"{where}: '{key}' must be {wanted} finite number{'s' * (counts != (1,))}, got {value!r:.60}"
+        )
+    return np.array(items, np.float64)
+
+
+def _camera(table: Any, where: str) -> Camera:
+    _check_keys(table, CAMERA_KEYS, where)
+    eye, target = _numbers(table, "eye", (3,), where), _numbers(table, "look_at", (3,), where)
+    if not np.linalg.norm(target - eye) > 0.0:
+        raise InputError(f"{where}: 'look_at' must differ from 'eye', got {eye.tolist()} twice")
+    degrees = float(_numbers({"yfov_degrees": DEFAULT_YFOV_DEGREES, **table}, "yfov_degrees", (1,), where)[0])
+    if not 0.0 < degrees < 180.0:
+        raise InputError(f"{where}: 'yfov_degrees' must lie between 0 and 180, got {degrees:g}")
+    return Camera(look_at(eye, target), math.radians(degrees))
+
+
+def _light(table: Any, where: str) -> Light:
+    kind = table.get("type") if isinstance(table, dict) else None
+    if not isinstance(kind, str) or kind not in LIGHT_KEYS:
+        raise InputError(f"{where}: 'type' must be 'spot', 'point' or 'directional', got {kind!r:.60}")
+    _check_keys(table, LIGHT_KEYS[kind], where)
+    intensity = _numbers(table, "intensity", (1, 3), where)
+    if (intensity < 0.0).any():
+        raise InputError(f"{where}: 'intensity' must not be negative, got {intensity.tolist()}")
+    placed: dict[str, Any] = {}
+    if kind != "directional" or "look_at" in table:
+        placed["position_world"] = _numbers(table, "position", (3,), where)
+    if kind != "point":
+        placed["direction_world"] = _direction(table, placed.get("position_world"), where)
+    if kind == "spot":
+        filled = {**DEFAULT_CONE_DEGREES, **table}
+        cone = [math.radians(float(_numbers(filled, key, (1,), where)[0])) for key in DEFAULT_CONE_DEGREES]
+        placed["inner_cone"], placed["outer_cone"] = cone
+        check_cone(cone[0], cone[1], where)
+    return Light(kind, np.broadcast_to(intensity, 3).copy(), **placed)
+
+
+def _direction(
+    table: dict[str, Any], position: Float64[np.ndarray, "3"] | None, where: str
+) -> Float64[np.ndarray, "3"]:
+    if ("direction" in table) == ("look_at" in table):
+        raise InputError(f"{where}: give one of 'direction' and 'look_at'")
+    if "direction" in table:
+        direction = _numbers(table, "direction", (3,), where)
+    else:
+        direction = _numbers(table, "look_at", (3,), where) - position
+    length = np.linalg.norm(direction)
+    if not length > 0.0:
+        raise InputError(f"{where}: the light's direction must not be zero")
+    return direction / length

@@ -1,0 +1,116 @@
+"""A scene over time: where things, lights and camera are at every frame of a clip."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+from jaxtyping import Float64
+
+from vpltune.renderer.scene.animation import AnimationPlayer, Pose
+from vpltune.renderer.scene.scene import Camera, Light, Scene
+from vpltune.renderer.scene.views import View, scaled_view
+
+Motion = Literal["auto", "none", "light", "camera", "both"]
+MOTIONS: tuple[Motion, ...] = get_args(Motion)
+
+MOTION_SECONDS = 8.0
+"""Once round and back to the start, so that a clip of this length repeats without a seam."""
+LIGHT_TURN = math.radians(15.0)
+"""A spot or directional light circles about the way it shines at the start, this far off its middle."""
+LIGHT_SWAY = 0.04
+"""Radius of a point light's circle, in diagonals of the scene."""
+CAMERA_TURN = math.radians(10.0)
+"""To either side, about what the camera looks at."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """One frame of a sequence."""
+
+    view: View
+    pose: Pose
+    """Where instances and joints are; the lights and cameras that count are the view's."""
+
+
+class Sequence:
+    """The animation of a scene, with light and camera moved besides where asked for.
+
+    Camera and lights of `view` that are the scene's own follow its animation, and are known by being the
+    very same objects. `motion` is added to them; "auto" moves light and camera where the scene has no
+    animation, and nothing where it has one. Moments are those of the scene `factor` times as large.
+    """
+
+    def __init__(self, scene: Scene, view: View, motion: Motion = "auto", factor: float = 1.0):
+        self._view = view
+        self._factor = factor
+        self._player = AnimationPlayer(scene)
+        self._followed_lights = [_index_of(light, scene.lights) for light in view.lights]
+        self._followed_camera = _index_of(view.camera, scene.cameras)
+        if motion == "auto":
+            motion = "both" if scene.animation is None else "none"
+        self._light_moves = motion in ("light", "both")
+        self._camera_moves = motion in ("camera", "both")
+        low, high = scene.bounds()
+        self._diagonal = float(np.linalg.norm(high - low))
+        self._target = _looked_at(view.camera, (low + high) / 2.0)
+
+    def at(self, seconds: float) -> Moment:
+        """The moment that many seconds after the start.
+
+        Raises:
+            InputError: the animation leaves the range of coordinates.
+        """
+        pose = self._player.pose_at(seconds)
+        camera = self._view.camera if self._followed_camera is None else pose.cameras[self._followed_camera]
+        lights = tuple(
+            light if followed is None else pose.lights[followed]
+            for light, followed in zip(self._view.lights, self._followed_lights, strict=True)
+        )
+        phase = 2.0 * math.pi * seconds / MOTION_SECONDS
+        if self._light_moves:
+            lights = tuple(_circled(light, phase, LIGHT_SWAY * self._diagonal) for light in lights)
+        if self._camera_moves:
+            camera = _swung(camera, self._target, CAMERA_TURN * math.sin(phase))
+        view = replace(self._view, camera=camera, lights=lights)
+        if self._factor == 1.0:
+            return Moment(view, pose)
+        grow = np.diag([self._factor, self._factor, self._factor, 1.0])
+        transforms, joint_matrices = grow @ pose.transforms, grow @ pose.joint_matrices
+        grown = replace(pose, transforms=transforms, joint_matrices=joint_matrices)
+        return Moment(scaled_view(view, self._factor), grown)
+
+
+def _index_of(wanted: object, among: tuple) -> int | None:
+    return next((index for index, item in enumerate(among) if item is wanted), None)
+
+
+def _looked_at(camera: Camera, center: Float64[np.ndarray, "3"]) -> Float64[np.ndarray, "3"]:
+    """The point of the camera's axis that is nearest to the scene's centre, but before the camera."""
+    forward = -camera.to_world[:3, 2]
+    distance = float(np.dot(center - camera.position_world, forward))
+    reach = float(np.linalg.norm(center - camera.position_world))
+    return camera.position_world + max(distance, 0.25 * reach) * forward
+
+
+def _circled(light: Light, phase: float, radius: float) -> Light:
+    """The light part of the way round its circle; at phase 0 it stands where it was."""
+    if light.kind == "point":
+        offset = radius * np.array([math.cos(phase) - 1.0, 0.0, math.sin(phase)])
+        return replace(light, position_world=light.position_world + offset)
+    down = light.direction_world
+    helper = np.array([1.0, 0.0, 0.0]) if abs(down[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    across = np.cross(down, helper)
+    across /= np.linalg.norm(across)
+    aside = math.cos(phase) - 1.0, math.sin(phase)
+    turned = down + math.tan(LIGHT_TURN) * (aside[0] * across + aside[1] * np.cross(down, across))
+    return replace(light, direction_world=turned / np.linalg.norm(turned))
+
+
+def _swung(camera: Camera, target: Float64[np.ndarray, "3"], angle: float) -> Camera:
+    """The camera turned about the vertical through `target`."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    turn = np.eye(4)
+    turn[:3, :3] = [[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]]
+    turn[:3, 3] = target - turn[:3, :3] @ target
+    return Camera(turn @ camera.to_world, camera.yfov)

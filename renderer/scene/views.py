@@ -1,0 +1,186 @@
+"""Views: a camera, a picture size and the lights that shine, kept in `views.json` in world units."""
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+from jaxtyping import Float64
+
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.files.atomic_file import write_text_whole
+from vpltune.renderer.scene.scene import Camera, Light, scaled_camera, scaled_light
+
+Split = Literal["fitted", "validation", "held_out"]
+"""What a view is for: `fitted` views are fitted to, `validation` views choose between the candidates of a
+fit, `held_out` views choose nothing and are only measured."""
+SPLITS: tuple[Split, ...] = get_args(Split)
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One picture to make: rays go through pixel centres, row 0 is at the top."""
+
+    name: str
+    split: Split
+    size: tuple[int, int]
+    """Width and height in pixels."""
+    camera: Camera
+    lights: tuple[Light, ...]
+
+
+def scaled_view(view: View, factor: float) -> View:
+    """The view of a scene `factor` times as large."""
+    return View(
+        view.name,
+        view.split,
+        view.size,
+        scaled_camera(view.camera, factor),
+        tuple(scaled_light(light, factor) for light in view.lights),
+    )
+
+
+def ray_directions_world(view: View) -> Float64[np.ndarray, "height width 3"]:
+    """Directions from the eye through the pixel centres, scaled to unit depth along the view axis."""
+    width, height = view.size
+    tan_half = math.tan(view.camera.yfov / 2.0)
+    x = (2.0 * (np.arange(width) + 0.5) / width - 1.0) * tan_half * width / height
+    y = (1.0 - 2.0 * (np.arange(height) + 0.5) / height) * tan_half
+    directions = np.empty((height, width, 3))
+    directions[..., 0] = x[None, :]
+    directions[..., 1] = y[:, None]
+    directions[..., 2] = -1.0
+    return directions @ view.camera.to_world[:3, :3].T
+
+
+def light_to_json(light: Light) -> dict[str, Any]:
+    """A light as it stands in `views.json`."""
+    return {
+        "type": light.kind,
+        "position": light.position_world.tolist(),
+        "direction": light.direction_world.tolist(),
+        "intensity": light.intensity.tolist(),
+        "inner_cone": light.inner_cone,
+        "outer_cone": light.outer_cone,
+    }
+
+
+def views_to_json(scene_path: str, views: tuple[View, ...]) -> dict[str, Any]:
+    """The contents of `views.json`; every length in world units, every angle in radians."""
+    return {
+        "scene": scene_path,
+        "views": [
+            {
+                "name": view.name,
+                "split": view.split,
+                "size": list(view.size),
+                "camera": {"to_world": view.camera.to_world.ravel().tolist(), "yfov": view.camera.yfov},
+                "lights": [light_to_json(light) for light in view.lights],
+            }
+            for view in views
+        ],
+    }
+
+
+def write_views(path: Path, scene_path: str, views: tuple[View, ...]) -> None:
+    """Write `views.json`, whole or not at all."""
+    write_text_whole(path, json.dumps(views_to_json(scene_path, views), indent=2) + "\n")
+
+
+def read_views(path: str | Path) -> tuple[View, ...]:
+    """Read `views.json`.
+
+    Raises:
+        InputError: the file cannot be read, or a key is missing, of the wrong shape or not finite.
+    """
+    try:
+        document = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+    except ValueError as error:
+        raise InputError(f"{path}: not JSON ({error})") from error
+    entries = document.get("views") if isinstance(document, dict) else None
+    if not isinstance(entries, list) or not entries:
+        raise InputError(f"{path}: key 'views' must be a list of at least one view")
+    return tuple(_view_from_json(entry, f"{path}: views[{index}]") for index, entry in enumerate(entries))
+
+
+def _view_from_json(entry: Any, where: str) -> View:
+    camera = _member(entry, "camera", where)
+    to_world = _numbers(camera, "to_world", 16, f"{where}.camera").reshape(4, 4)
+    rotation = to_world[:3, :3]
+    # 1e-4: matrices printed with five digits pass, a scaled or sheared camera does not.
+    if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-4 or np.linalg.det(rotation) < 0.0:
+        raise InputError(f"{where}.camera.to_world: must be a rotation and a translation, row by row")
+    yfov = float(_numbers(camera, "yfov", 1, f"{where}.camera")[0])
+    if not 0.0 < yfov < math.pi:
+        raise InputError(f"{where}.camera.yfov: must lie in (0, π) radians, got {yfov}")
+    size = _numbers(entry, "size", 2, where)
+    if (size < 1).any() or (size > 16384).any() or (size != np.round(size)).any():
+        raise InputError(f"{where}.size: must be two whole numbers from 1 to 16384, got {size.tolist()}")
+    split = _member(entry, "split", where)
+    if split not in SPLITS:
+        raise InputError(f"{where}.split: must be one of {', '.join(SPLITS)}, got {split!r:.60}")
+    lights = _member(entry, "lights", where)
+    if not isinstance(lights, list):
+        raise InputError(f"{where}.lights: must be a list, got {type(lights).__name__}")
+    return View(
+        name=str(_member(entry, "name", where)),
+        split=split,
+        size=(int(size[0]), int(size[1])),
+        camera=Camera(to_world, yfov),
+        lights=tuple(_light_from_json(light, f"{where}.lights[{i}]") for i, light in enumerate(lights)),
+    )
+
+
+def _light_from_json(entry: Any, where: str) -> Light:
+    kind = _member(entry, "type", where)
+    if kind not in ("spot", "point", "directional"):
+        raise InputError(f"{where}.type: must be 'spot', 'point' or 'directional', got {kind!r}")
+    intensity = _numbers(entry, "intensity", 3, where)
+    if (intensity < 0.0).any():
+        raise InputError(f"{where}.intensity: must not be negative, got {intensity.tolist()}")
+    light: dict[str, Any] = {}
+    if kind != "directional":
+        light["position_world"] = _numbers(entry, "position", 3, where)
+    if kind != "point":
+        direction = _numbers(entry, "direction", 3, where)
+        length = np.linalg.norm(direction)
+        if not length > 0.0:
+            raise InputError(f"{where}.direction: must not be zero")
+        light["direction_world"] = direction / length
+    if kind == "spot":
+        light["inner_cone"] = float(_numbers(entry, "inner_cone", 1, where)[0])
+        light["outer_cone"] = float(_numbers(entry, "outer_cone", 1, where)[0])
+        check_cone(light["inner_cone"], light["outer_cone"], where)
+    return Light(kind=kind, intensity=intensity, **light)
+
+
+def check_cone(inner_cone: float, outer_cone: float, where: str) -> None:
+    """Raises InputError unless 0 ≤ inner < outer ≤ π/2, the rule of KHR_lights_punctual."""
+    if not 0.0 <= inner_cone < outer_cone <= math.pi / 2 + 1e-6:
+        raise InputError(
+            f"{where}: cone angles must satisfy 0 ≤ inner < outer ≤ π/2, got {inner_cone} and {outer_cone}"
+        )
+
+
+def _member(entry: Any, key: str, where: str) -> Any:
+    if not isinstance(entry, dict):
+        raise InputError(f"{where}: must be an object, got {type(entry).__name__}")
+    if key not in entry:
+        raise InputError(f"{where}: key '{key}' is missing")
+    return entry[key]
+
+
+def _numbers(entry: Any, key: str, count: int, where: str) -> Float64[np.ndarray, " count"]:
+    value = _member(entry, key, where)
+    items = value if isinstance(value, list) else [value]
+    # bool is an int to Python; JSON's 1e999 arrives as infinity and NaN as itself.
+    plain = all(isinstance(item, int | float) and not isinstance(item, bool) for item in items)
+    if not plain or len(items) != count or not all(abs(item) <= 1e30 for item in items):
+        raise InputError(
+            f"{where}.{key}: must be {count} finite number{'s' * (count > 1)}, got {value!r:.60}"
+        )
+    return np.array(items, np.float64)

@@ -1,8 +1,0 @@
-"""Cameras, lights and views for scenes that bring none, and the small file in which a user says otherwise."""
-
-from renderer.view_placement.automatic_camera import default_camera
-from renderer.view_placement.automatic_light import default_light
-from renderer.view_placement.scene_sidecar import resolve_camera_and_lights
-from renderer.view_placement.view_set import views_for_scene
-
-__all__ = ["default_camera", "default_light", "resolve_camera_and_lights", "views_for_scene"]

@@ -1,0 +1,73 @@
+"""Draw docs/report.png: the page of a scene, and the page of the library that it belongs to.
+
+    python scripts/make_report_image.py
+
+Fits the shipped scenes with `vpltune batch`, writes their pages with `vpltune report`, and photographs two of
+them in the system's Chromium.
+"""
+
+import io
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+from PIL import Image
+from playwright.sync_api import Browser, sync_playwright
+
+from vpltune.__main__ import run
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+SCENES = REPOSITORY / "configs" / "scenes"
+PICTURE = REPOSITORY / "docs" / "report.png"
+SHOWN = "gallery"
+SIZE = {"width": 1180, "height": 1180}
+SCALE = 0.6
+STEP = 4
+"""Of colour: six bits a channel look the same and weigh a third less."""
+
+
+def main() -> None:
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        sys.exit("no chromium; run: apt-get install chromium")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        if run(["batch", str(SCENES), "-o", str(folder)]) or run(["report", str(folder)]):
+            sys.exit("the shipped scenes could not be fitted")
+        (scene,) = folder.glob(f"scenes/{SHOWN}-*/report.html")
+        with sync_playwright() as playwright:
+            arguments = ["--headless", "--no-sandbox", "--disable-gpu"]
+            browser = playwright.chromium.launch(executable_path=chromium, args=arguments)
+            pages = [
+                photograph(browser, scene, "light", ".view"),
+                # Where the library lay says nothing to a reader.
+                photograph(
+                    browser, folder / "index.html", "dark", "table", without="main > section:has(.origin)"
+                ),
+            ]
+            browser.close()
+    picture = Image.new("RGB", (sum(page.width for page in pages), pages[0].height))
+    for index, page in enumerate(pages):
+        picture.paste(page, (index * page.width, 0))
+    picture = picture.resize(
+        (round(SCALE * picture.width), round(SCALE * picture.height)), Image.Resampling.LANCZOS
+    )
+    picture = picture.point(lambda value: min(255, (value + STEP // 2) // STEP * STEP))
+    picture.save(PICTURE, optimize=True)
+    print(f"wrote {PICTURE} ({PICTURE.stat().st_size // 1000} kB)")
+
+
+def photograph(browser: Browser, page_path: Path, scheme: str, shown: str, without: str = "") -> Image.Image:
+    """The top of a page once `shown` is there and its pictures are drawn, but for what `without` selects."""
+    page = browser.new_context(viewport=SIZE, color_scheme=scheme).new_page()
+    page.goto(page_path.as_uri())
+    page.wait_for_selector(shown)
+    page.wait_for_timeout(1000)
+    if without:
+        page.evaluate("selector => document.querySelector(selector).remove()", without)
+    return Image.open(io.BytesIO(page.screenshot()))
+
+
+if __name__ == "__main__":
+    main()

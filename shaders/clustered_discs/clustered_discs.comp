@@ -1,0 +1,78 @@
+// VPL cells, part 2: each VPL takes the light of its cell, and stands in its middle. One workgroup for each VPL.
+#include "common/scene_length.glsl"
+
+const float PI = 3.14159265358979;
+#include "common/clustered_discs.glsl"
+#include "common/clustered_discs_buffers.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(std430, binding = VIRTUAL_POINT_LIGHTS_BINDING) buffer VirtualPointLights {
+    VirtualPointLight virtual_point_lights[];
+};
+
+uniform int sample_count;
+
+shared CellSums sums[64];
+shared float distances[64];
+shared int nearest_samples[64];
+
+void sum_lanes(int lane) {
+    for (int reach = 32; reach > 0; reach /= 2) {
+        barrier();
+        if (lane < reach) {
+            sums[lane] = joined(sums[lane], sums[lane + reach]);
+        }
+    }
+    barrier();
+}
+
+// The sample that is nearest to the middle; among equals the first.
+int sample_nearest_to(int vpl_index, int lane, vec3 middle, vec3 normal) {
+    float nearest = 1e30;
+    int found = -1;
+    for (int i = lane; i < sample_count; i += 64) {
+        if (vpl_owners[i] == vpl_index) {
+            VirtualPointLight one = vpl_samples[i];
+            float away = cell_distance(
+                one.position_footprint.xyz - middle, one.normal_area.xyz, normal, scene_length * scene_length);
+            if (away < nearest) {
+                nearest = away;
+                found = i;
+            }
+        }
+    }
+    distances[lane] = nearest;
+    nearest_samples[lane] = found;
+    for (int reach = 32; reach > 0; reach /= 2) {
+        barrier();
+        if (lane < reach) {
+            int other = lane + reach;
+            bool first = nearest_samples[other] < nearest_samples[lane];
+            if (distances[other] < distances[lane] || (distances[other] == distances[lane] && first)) {
+                distances[lane] = distances[other];
+                nearest_samples[lane] = nearest_samples[other];
+            }
+        }
+    }
+    barrier();
+    return nearest_samples[0];
+}
+
+void main() {
+    int vpl_index = int(gl_WorkGroupID.x);
+    int lane = int(gl_LocalInvocationIndex);
+    vec3 before = virtual_point_lights[vpl_index].position_footprint.xyz;
+    CellSums own = NO_SAMPLES;
+    for (int i = lane; i < sample_count; i += 64) {
+        if (vpl_owners[i] == vpl_index) {
+            own = with_sample(own, vpl_samples[i], before);
+        }
+    }
+    sums[lane] = own;
+    sum_lanes(lane);
+    int middle = sample_nearest_to(vpl_index, lane, before + cell_offset(sums[0]), cell_normal(sums[0]));
+    if (lane == 0) {
+        virtual_point_lights[vpl_index] = middle >= 0 ? cell_vpl(sums[0], before, vpl_samples[middle]) : NO_VPL;
+    }
+}

@@ -1,0 +1,65 @@
+// VPL cells, part 2: each VPL takes the light of its cell, and stands in its middle. One fragment for each VPL,
+// which looks at every sample.
+const float PI = 3.14159265358979;
+#include "common/clustered_discs.glsl"
+#include "web/scene_length.glsl"
+#include "web/vpl_samples.glsl"
+#include "web/vpl_texture.glsl"
+
+uniform highp isampler2D vpl_owners;
+uniform int vpl_count;
+uniform int sample_rows;
+
+layout(location = 0) out vec4 out_position_footprint;
+layout(location = 1) out vec4 out_normal_area;
+layout(location = 2) out vec4 out_flux;
+
+// The sample that is nearest to the middle; among equals the first.
+ivec2 sample_nearest_to(int vpl_index, vec3 middle, vec3 normal) {
+    float scene_length = measured_scene_length();
+    float nearest = 1e30;
+    ivec2 found = ivec2(-1);
+    for (int row = 0; row < sample_rows; ++row) {
+        for (int column = 0; column < VPL_COLUMNS; ++column) {
+            ivec2 texel = ivec2(column, row);
+            if (texelFetch(vpl_owners, texel, 0).r == vpl_index) {
+                VirtualPointLight one = sample_at(texel);
+                float away = cell_distance(
+                    one.position_footprint.xyz - middle, one.normal_area.xyz, normal, scene_length * scene_length);
+                if (away < nearest) {
+                    nearest = away;
+                    found = texel;
+                }
+            }
+        }
+    }
+    return found;
+}
+
+void main() {
+    ivec2 place = ivec2(gl_FragCoord.xy);
+    int vpl_index = place.y * VPL_COLUMNS + place.x;
+    VirtualPointLight vpl = NO_VPL;
+    if (vpl_index < vpl_count) {
+        vec3 before = vpl_at(vpl_index).position_footprint.xyz;
+        CellSums sums = NO_SAMPLES;
+        for (int row = 0; row < sample_rows; ++row) {
+            // A sum of sums: fewer digits are lost.
+            CellSums sums_of_row = NO_SAMPLES;
+            for (int column = 0; column < VPL_COLUMNS; ++column) {
+                ivec2 texel = ivec2(column, row);
+                if (texelFetch(vpl_owners, texel, 0).r == vpl_index) {
+                    sums_of_row = with_sample(sums_of_row, sample_at(texel), before);
+                }
+            }
+            sums = joined(sums, sums_of_row);
+        }
+        ivec2 middle = sample_nearest_to(vpl_index, before + cell_offset(sums), cell_normal(sums));
+        if (middle.x >= 0) {
+            vpl = cell_vpl(sums, before, sample_at(middle));
+        }
+    }
+    out_position_footprint = vpl.position_footprint;
+    out_normal_area = vpl.normal_area;
+    out_flux = vpl.flux;
+}

@@ -1,0 +1,28 @@
+// VPL cells, part 1: the VPL that is nearest to each sample; -1 where the sample is dark.
+const float PI = 3.14159265358979;
+#include "common/clustered_discs.glsl"
+#include "web/scene_length.glsl"
+#include "web/vpl_samples.glsl"
+#include "web/vpl_texture.glsl"
+
+uniform int vpl_count;
+
+layout(location = 0) out int out_owner;
+
+void main() {
+    VirtualPointLight own = sample_at(ivec2(gl_FragCoord.xy));
+    float scene_length = measured_scene_length();
+    float nearest = 1e30;
+    int owner = -1;
+    for (int i = 0; i < vpl_count; ++i) {
+        VirtualPointLight vpl = vpl_at(i);
+        vec3 between = own.position_footprint.xyz - vpl.position_footprint.xyz;
+        float away = cell_distance(
+            between, own.normal_area.xyz, vpl.normal_area.xyz, scene_length * scene_length);
+        if (away < nearest && vpl.normal_area.w > 0.0) {
+            nearest = away;
+            owner = i;
+        }
+    }
+    out_owner = own.normal_area.w > 0.0 ? owner : -1;
+}

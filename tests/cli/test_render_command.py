@@ -1,0 +1,195 @@
+"""`vpltune render`: every layer reaches its file, in the form that the file's name asks for."""
+
+import json
+import re
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from vpltune.__main__ import run
+from vpltune.cli.options import Layer
+from vpltune.renderer.errors import MachineError
+from vpltune.renderer.files.image_file import read_exr
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.frame.runtime_options import RuntimeOptions
+from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.views import View, write_views
+
+SCENE = Path(__file__).resolve().parents[2] / "configs" / "scenes" / "cornell-box.glb"
+LAYERS = get_args(Layer)
+SIZE = (32, 24)
+
+
+@pytest.fixture(scope="module")
+def views_path(tmp_path_factory) -> Path:
+    """Two views of the shipped box, by its own camera: one by its own light, one in the dark."""
+    scene = read_scene(SCENE)
+    (camera,), lights = scene.cameras, scene.lights
+    path = tmp_path_factory.mktemp("views") / "views.json"
+    write_views(
+        path,
+        str(SCENE),
+        (View("front", "fitted", SIZE, camera, lights), View("dark", "held_out", (8, 8), camera, ())),
+    )
+    return path
+
+
+def render(views_path, output, *more):
+    return run(
+        ["render", str(SCENE), "-o", str(output), "--views", str(views_path), "--view", "front", *more]
+    )
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_every_layer_is_a_picture_and_an_exr(views_path, tmp_path, layer):
+    for name in ("a.png", "a.exr"):
+        assert render(views_path, tmp_path / name, "--layer", layer) == 0
+    with Image.open(tmp_path / "a.png") as image:
+        assert image.size == SIZE
+        assert np.asarray(image).max() > 50
+    pixels = read_exr(tmp_path / "a.exr")
+    assert pixels.shape == ((24, 32) if layer == "depth" else (24, 32, 3))
+    assert pixels.dtype == np.float32
+    assert np.isfinite(pixels).all()
+    assert pixels.max() > 0.0
+
+
+def test_maps_are_the_runtimes_unless_asked_otherwise(views_path, tmp_path, capfd):
+    """As fine as `RuntimeOptions` has them, which the help states."""
+    drawn = {}
+    for refinement in (None, 1):
+        more = () if refinement is None else (f"--map-refinement={refinement}",)
+        assert render(views_path, tmp_path / "a.exr", "--layer", "irradiance", *more) == 0
+        drawn[refinement] = read_exr(tmp_path / "a.exr")
+    scene = read_scene(SCENE)
+    (camera,) = scene.cameras
+    ours = Runtime(scene, "default").render(View("front", "fitted", SIZE, camera, scene.lights), "irradiance")
+    np.testing.assert_array_equal(drawn[None], ours)
+    assert (drawn[1] != ours).any()
+    capfd.readouterr()
+    assert run(["render", "--help"]) == 0
+    shown = capfd.readouterr().out
+    for default in (RuntimeOptions.visibility_map_size, RuntimeOptions.visibility_map_refinement):
+        assert f"[{default}]" in shown
+
+
+def test_interleaved_pictures_are_near_the_full_one(views_path, tmp_path):
+    """Their energy within 5 %: at 32×24, one pixel in five stands at an edge."""
+    means = []
+    for n in ("1", "4"):
+        path = tmp_path / f"{n}.exr"
+        assert render(views_path, path, "--layer", "irradiance", "--interleave", n) == 0
+        means.append(float(read_exr(path).mean()))
+    assert means[0] != means[1]
+    assert means[1] == pytest.approx(means[0], rel=0.05)
+
+
+def test_a_block_of_another_size_is_refused(views_path, tmp_path, capfd):
+    assert render(views_path, tmp_path / "a.png", "--interleave", "3") == 2
+    assert "--interleave: must be one of (1, 2, 4, 8), got 3" in capfd.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_exr_of_final_is_the_radiance_before_the_tone_curve(views_path, tmp_path):
+    pixels = {}
+    for layer in ("final", "direct", "indirect"):
+        assert render(views_path, tmp_path / f"{layer}.exr", "--layer", layer) == 0
+        pixels[layer] = read_exr(tmp_path / f"{layer}.exr")
+    # The runtime keeps radiance in half precision at the least: eleven bits, twice rounded.
+    total = pixels["direct"] + pixels["indirect"]
+    np.testing.assert_allclose(pixels["final"], total, rtol=2e-3, atol=1e-3 * total.mean())
+
+
+def test_dynamic_lights_add_to_direct_light_only(views_path, tmp_path):
+    pixels = {}
+    for layer in ("direct", "indirect"):
+        for count in ("0", "100"):
+            name = f"{layer}{count}.exr"
+            assert render(views_path, tmp_path / name, "--layer", layer, "--dynamic-lights", count) == 0
+            pixels[layer, count] = read_exr(tmp_path / name)
+    added = pixels["direct", "100"] - pixels["direct", "0"]
+    assert (added >= 0.0).all()
+    # They stand out beside the light of the view, and do not outshine it.
+    assert 0.02 < added.mean() / pixels["direct", "0"].mean() < 1.0
+    np.testing.assert_array_equal(pixels["indirect", "100"], pixels["indirect", "0"])
+
+
+def test_pictures_of_a_scaled_scene_are_the_same(views_path, tmp_path):
+    for name, scale in (("one.exr", "1"), ("hundred.exr", "100")):
+        assert render(views_path, tmp_path / name, "--layer", "irradiance", "--scale", scale) == 0
+    one, hundred = read_exr(tmp_path / "one.exr"), read_exr(tmp_path / "hundred.exr")
+    # 1e-3 relative RMSE is what the project promises of scale.
+    assert np.sqrt(((one - hundred) ** 2).mean() / (one**2).mean()) < 1e-3
+
+
+def test_a_size_on_the_command_line_goes_before_the_views(views_path, tmp_path, capfd):
+    assert render(views_path, tmp_path / "a.png", "--size", "20x10", "--json") == 0
+    document = json.loads(capfd.readouterr().out)
+    assert document["view"]["size"] == [20, 10]
+    assert document["view"]["name"] == "front"
+    assert document["status"] == "ok"
+    with Image.open(tmp_path / "a.png") as image:
+        assert image.size == (20, 10)
+
+
+def test_camera_and_light_from_flags(tmp_path, capfd):
+    arguments = [
+        "--eye",
+        "0,0,1",
+        "--look-at",
+        "0,0,0",
+        "--light-type",
+        "point",
+        "--light-position",
+        "0,0,0.5",
+    ]
+    assert (
+        run(["render", str(SCENE), "-o", str(tmp_path / "a.png"), "--size", "8x8", "--json", *arguments]) == 0
+    )
+    view = json.loads(capfd.readouterr().out)["view"]
+    assert view["camera"]["to_world"] == [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1, 0, 0, 0, 1]
+    assert [light["type"] for light in view["lights"]] == ["point"]
+
+
+def test_a_scene_gets_camera_and_light_by_itself(tmp_path):
+    assert run(["render", str(SCENE), "-o", str(tmp_path / "a.png"), "--size", "32x24"]) == 0
+    with Image.open(tmp_path / "a.png") as image:
+        assert np.asarray(image).std() > 5
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (["--view", "back"], "--view: .*views.json has front, dark, got 'back'"),
+        ([], "--view: must be given, .*views.json has front, dark"),
+        (
+            ["--view", "front", "--eye", "0,0,1", "--look-at", "0,0,0"],
+            "--views: has its own camera and lights",
+        ),
+    ],
+)
+def test_views_that_cannot_be_are_refused(views_path, tmp_path, capfd, more, message):
+    arguments = ["render", str(SCENE), "-o", str(tmp_path / "a.png"), "--views", str(views_path), *more]
+    assert run(arguments) == 2
+    error = capfd.readouterr().err
+    assert re.search(message, error)
+    assert error.count("\n") == 1
+    assert not (tmp_path / "a.png").exists()
+
+
+def test_an_output_in_the_way_is_refused_after_drawing(views_path, tmp_path, capfd):
+    (tmp_path / "a.png").mkdir()
+    assert render(views_path, tmp_path / "a.png") == 2
+    assert "a.png" in capfd.readouterr().err
+
+
+def test_no_opengl_is_exit_code_3(views_path, tmp_path, monkeypatch, capfd):
+    def refuse(self, *arguments, **options):
+        raise MachineError("no headless OpenGL context; run: vpltune doctor")
+
+    monkeypatch.setattr(Runtime, "__init__", refuse)
+    assert render(views_path, tmp_path / "a.png") == 3
+    assert capfd.readouterr().err == "vpltune: no headless OpenGL context; run: vpltune doctor\n"

@@ -1,0 +1,169 @@
+"""The example that reads an exported bundle draws the runtime's picture, without any of our packages."""
+
+import dataclasses
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from built_scenes import ROOM_LIGHTS, colored_room, room_view
+from exported_frames import CONFIG, READER, SCENES, textured_room
+from PIL import Image
+
+from vpltune import Runtime
+from vpltune.__main__ import run
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.export.scene_bundle import scene_bundle, write_bundle
+from vpltune.renderer.scene.scene import look_at
+from vpltune.tuner.fitting.fit_density import CELL_FOOTPRINT
+
+# Importing one of ours would fail.
+WITHOUT_US = (
+    "import runpy, sys\n"
+    "sys.modules.update(dict.fromkeys(['renderer', 'tuner', 'shaders', 'configs']))\n"
+    "sys.argv = sys.argv[1:]\n"
+    "sys.path.insert(0, sys.argv[0].rpartition('/')[0])\n"
+    "runpy.run_path(sys.argv[0], run_name='__main__')"
+)
+
+
+def read_picture(folder, output):
+    command = [sys.executable, "-c", WITHOUT_US, str(READER), str(folder), str(output)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=folder, check=False)
+    assert done.returncode == 0, done.stderr
+    return np.asarray(Image.open(output)), done.stderr
+
+
+@pytest.mark.parametrize(
+    ("light", "visibility"),
+    [
+        ("spot", "none"),
+        ("spot", "transmittance"),
+        ("wide_spot", "transmittance"),
+        ("point", "transmittance"),
+        ("directional", "transmittance"),
+        ("spot", "maps"),
+        ("point", "maps"),
+    ],
+)
+def test_the_picture_is_the_runtimes(tmp_path, light, visibility):
+    scene, view, config = textured_room(), room_view(light, (96, 72)), CONFIG.seen_by(visibility)
+    write_bundle(tmp_path, scene_bundle(scene, view, config, rsm_resolution=256))
+    picture, said = read_picture(tmp_path, tmp_path / "picture.png")
+    ours = Runtime(scene, config, rsm_resolution=256).render(view)
+    assert said == ""
+    assert np.ptp(ours) > 100
+    difference = np.abs(picture.astype(int) - ours)
+    # Where the edge of a triangle passes through a pixel's centre, rounding decides which side is drawn.
+    assert (difference.max(axis=-1) > 1).mean() < 1e-3, difference.max()
+    assert difference.mean() < 0.1
+
+
+def test_several_lights_share_the_vpls(tmp_path):
+    scene, view = colored_room(), room_view("spot", (64, 48))
+    view = dataclasses.replace(
+        view, lights=(ROOM_LIGHTS["directional"], ROOM_LIGHTS["point"], ROOM_LIGHTS["spot"])
+    )
+    write_bundle(tmp_path, scene_bundle(scene, view, CONFIG, rsm_resolution=128))
+    picture, _ = read_picture(tmp_path, tmp_path / "picture.png")
+    ours = Runtime(scene, CONFIG, rsm_resolution=128).render(view)
+    assert (np.abs(picture.astype(int) - ours).max(axis=-1) > 1).mean() < 1e-3
+
+
+@pytest.mark.parametrize("turned", ["light", "camera"])
+def test_nothing_lit_or_nothing_seen_is_black(tmp_path, turned):
+    """Few VPLs, placed by all that there is to place them by."""
+    parameters = dataclasses.replace(
+        CONFIG.parameters, vpl_count=8, density_importance=0.7, density_relaxation=2
+    )
+    scene, view, config = (
+        colored_room(),
+        room_view("spot", (32, 24)),
+        TunedConfig(parameters, visibility="maps"),
+    )
+    # Beyond all walls, and on outwards.
+    outside = look_at(np.array([0.0, 0.0, 1e3]), np.array([0.0, 0.0, 2e3]))
+    if turned == "light":
+        light = dataclasses.replace(
+            view.lights[0], position_world=outside[:3, 3], direction_world=-outside[:3, 2]
+        )
+        view = dataclasses.replace(view, lights=(light,))
+    else:
+        view = dataclasses.replace(view, camera=dataclasses.replace(view.camera, to_world=outside))
+    write_bundle(tmp_path, scene_bundle(scene, view, config, rsm_resolution=64))
+    picture, said = read_picture(tmp_path, tmp_path / "picture.png")
+    ours = Runtime(scene, config, rsm_resolution=64).render(view)
+    assert said == ""
+    assert not picture.any()
+    assert not ours.any()
+
+
+@pytest.mark.parametrize(
+    ("name", "visibility"),
+    [
+        ("cornell-box", "maps"),
+        ("cornell-box", "none"),
+        pytest.param("gallery", "maps", marks=pytest.mark.slow),
+    ],
+)
+def test_a_shipped_scene_by_the_command_line(tmp_path, capfd, name, visibility):
+    """Every pixel to 1/255, with the runtime's own defaults."""
+    scene, bundle = str(SCENES / f"{name}.glb"), tmp_path / "bundle"
+    common = ["--size", "96x72", "--visibility", visibility]
+    assert run(["export", "default", "--to", "bundle", "--scene", scene, "-o", str(bundle), *common]) == 0
+    assert capfd.readouterr().err == ""
+    assert run(["render", scene, "-o", str(tmp_path / "ours.png"), *common]) == 0
+    picture, _ = read_picture(bundle, tmp_path / "theirs.png")
+    ours = np.asarray(Image.open(tmp_path / "ours.png")).astype(int)
+    assert np.abs(picture - ours).max() <= 1
+
+
+@pytest.mark.parametrize("light", ["point", "directional"])
+@pytest.mark.parametrize("placement", [{"density_relaxation": 8}, {"density_importance": 0.7}], ids=str)
+def test_few_vpls_are_placed_as_the_runtime_places_them(tmp_path, light, placement):
+    """As cells, which shine as discs, or by what the camera sees."""
+    plain = dataclasses.replace(CONFIG.parameters, vpl_count=32, falloff_footprint=CELL_FOOTPRINT)
+    parameters = dataclasses.replace(plain, **placement)
+    scene, view = textured_room(), room_view(light, (96, 72))
+    bundle = scene_bundle(scene, view, TunedConfig(parameters, visibility="maps"), rsm_resolution=256)
+    write_bundle(tmp_path, bundle)
+    picture, _ = read_picture(tmp_path, tmp_path / "picture.png")
+    ours, others = (
+        Runtime(scene, TunedConfig(form, visibility="maps"), rsm_resolution=256).render(view)
+        for form in (parameters, plain)
+    )
+    assert (np.abs(picture - ours.astype(int)).max(axis=-1) > 1).mean() < 1e-3
+    assert (np.abs(picture - others.astype(int)).max(axis=-1) > 3).mean() > 0.1
+
+
+@pytest.mark.parametrize("file", sorted(READER.parent.glob("standalone_*")), ids=lambda file: file.name)
+def test_the_reader_is_short(file):
+    assert len(file.read_text(encoding="utf-8").splitlines()) < 150
+
+
+def test_a_bundle_is_json_that_describes_its_bytes(tmp_path):
+    view = room_view("point", (16, 12))
+    write_bundle(tmp_path, scene_bundle(textured_room(), view, CONFIG))
+    document = json.loads((tmp_path / "bundle.json").read_text())
+    content = (tmp_path / "bundle.bin").read_bytes()
+    for name, array in document["arrays"].items():
+        assert array["offset"] % 4 == 0 and array["offset"] + array["bytes"] <= len(content), name
+        assert np.prod(array["shape"]) * np.dtype(array["type"]).itemsize == array["bytes"], name
+    assert document["config"]["parameters"] == CONFIG.parameters.as_dict()
+    assert len(document["rsm"]["faces"]) == 6
+    assert sum(draw["count"] for draw in document["draws"]) == textured_room().triangle_count()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--to", "bundle"], "--scene: must be given with --to bundle"),
+        (["--to", "json", "--size", "4x4"], "--to json: takes no camera, light, view or size"),
+        (["--to", "c", "--scene", "a.glb"], "--scene: --to c takes none"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(tmp_path, capfd, arguments, message):
+    assert run(["export", "default", "-o", str(tmp_path / "out"), *arguments]) == 2
+    assert message in capfd.readouterr().err
+    assert not list(tmp_path.iterdir())

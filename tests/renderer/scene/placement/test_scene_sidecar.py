@@ -1,0 +1,156 @@
+"""The TOML beside a scene, and what goes before what."""
+
+import math
+
+import numpy as np
+import pytest
+from built_scenes import colored_room, room_view
+from scene_paths import OWN_SCENES
+
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.placement import resolve_camera_and_lights
+from vpltune.renderer.scene.placement.free_space import free_space
+from vpltune.renderer.scene.placement.scene_sidecar import read_sidecar, sidecar_path
+from vpltune.renderer.scene.placement.sight import lit_fraction, seen_by
+from vpltune.renderer.scene.scene import Light, Scene
+
+CAMERA = "[camera]\neye = [3.6, 2.7, -1.7]\nlook_at = [-2, 1.7, 0.9]\nyfov_degrees = 65\n"
+SPOT = """[[light]]
+type = "spot"
+position = [0.0, 2.0, 0.0]
+look_at = [0.0, 0.0, 2.0]
+intensity = 10
+inner_cone_degrees = 30
+outer_cone_degrees = 60
+"""
+
+
+def written(tmp_path, text):
+    path = tmp_path / "room.vpltune.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def with_lights(scene: Scene, *lights: Light) -> Scene:
+    return Scene(scene.name, scene.meshes, scene.instances, scene.materials, scene.textures, lights)
+
+
+def test_the_sidecar_lies_beside_the_scene(tmp_path):
+    assert sidecar_path(tmp_path / "room.glb") == tmp_path / "room.vpltune.toml"
+
+
+def test_camera_and_spot(tmp_path):
+    camera, lights = read_sidecar(written(tmp_path, CAMERA + SPOT))
+    assert camera.position_world.tolist() == [3.6, 2.7, -1.7]
+    ahead = np.array([-2, 1.7, 0.9]) - np.array([3.6, 2.7, -1.7])
+    assert -camera.to_world[:3, 2] == pytest.approx(ahead / np.linalg.norm(ahead))
+    assert camera.yfov == pytest.approx(math.radians(65))
+    (light,) = lights
+    assert light.kind == "spot" and light.intensity.tolist() == [10, 10, 10]
+    assert light.direction_world == pytest.approx([0, -math.sqrt(0.5), math.sqrt(0.5)])
+    assert math.degrees(light.inner_cone) == pytest.approx(30)
+    assert math.degrees(light.outer_cone) == pytest.approx(60)
+
+
+def test_point_and_directional(tmp_path):
+    text = '[[light]]\ntype = "point"\nposition = [1, 2, 3]\nintensity = [1, 2, 3]\n'
+    text += '[[light]]\ntype = "directional"\ndirection = [0, -3, 0]\nintensity = 5.5\n'
+    camera, (point, sun) = read_sidecar(written(tmp_path, text))
+    assert camera is None
+    assert point.position_world.tolist() == [1, 2, 3] and point.intensity.tolist() == [1, 2, 3]
+    assert sun.direction_world.tolist() == [0, -1, 0] and sun.intensity.tolist() == [5.5] * 3
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[camera]\neye = [0, 0, 0]\nlook_at = [0, 0, 1]\nfov = 3\n", r"\[camera\]: unknown key 'fov'"),
+        ("[camra]\n", "unknown key 'camra'"),
+        ("[camera\n", "not TOML"),
+        ("camera = 3\n", "must be a table, got int"),
+        ("[camera]\neye = [0, 0, 0]\n", "key 'look_at' is missing"),
+        (
+            "[camera]\neye = [0, 0, nan]\nlook_at = [0, 0, 1]\n",
+            r"must be 3 finite numbers, got \[0, 0, nan\]",
+        ),
+        ("[camera]\neye = [0, 0, 1e300]\nlook_at = [0, 0, 1]\n", "'eye' must be 3 finite numbers"),
+        ("[camera]\neye = [0, 0]\nlook_at = [0, 0, 1]\n", "'eye' must be 3 finite numbers"),
+        ("[camera]\neye = [0, 0, true]\nlook_at = [0, 0, 1]\n", "'eye' must be 3 finite numbers"),
+        ("[camera]\neye = [0, 0, 1]\nlook_at = [0, 0, 1]\n", "'look_at' must differ from 'eye'"),
+        (CAMERA.replace("65", "180"), "'yfov_degrees' must lie between 0 and 180, got 180"),
+        (SPOT.replace('"spot"', '"sopt"'), "'type' must be 'spot', 'point' or 'directional', got 'sopt'"),
+        (SPOT.replace("[[light]]", "[light]"), r"lights must be written as \[\[light\]\] tables"),
+        (SPOT.replace("intensity = 10", "intensity = -1"), "'intensity' must not be negative"),
+        (SPOT.replace("intensity = 10", "intensity = inf"), "'intensity' must be 1 or 3 finite numbers"),
+        (SPOT.replace("= 30", "= 70"), r"cone angles must satisfy 0 ≤ inner < outer"),
+        (SPOT + "direction = [0, -1, 0]\n", "give one of 'direction' and 'look_at'"),
+        (SPOT.replace("[0.0, 0.0, 2.0]", "[0.0, 2.0, 0.0]"), "direction must not be zero"),
+        (SPOT.replace("spot", "point"), "unknown key 'look_at'"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_by_name(tmp_path, text, message):
+    path = written(tmp_path, text)
+    with pytest.raises(InputError, match=message) as error:
+        read_sidecar(path)
+    assert str(error.value).startswith(str(path)) and "\n" not in str(error.value)
+
+
+def test_a_sidecar_that_is_not_text_is_refused(tmp_path):
+    path = tmp_path / "room.vpltune.toml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="not TOML"):
+        read_sidecar(path)
+
+
+def test_flags_go_before_sidecar_before_file_before_automatic(tmp_path):
+    scene, view = colored_room(), room_view()
+    scene_path = tmp_path / "room.glb"
+    camera, lights, notes = resolve_camera_and_lights(scene, scene_path, None, None)
+    assert len(notes) == 2 and all("chosen automatically" in note for note in notes)
+
+    in_file = with_lights(scene, *view.lights)
+    _, lights, notes = resolve_camera_and_lights(in_file, scene_path, view.camera, None)
+    assert lights is in_file.lights and notes == ()
+
+    written(tmp_path, CAMERA + SPOT)
+    camera, lights, notes = resolve_camera_and_lights(in_file, scene_path, None, None)
+    assert camera.position_world.tolist() == [3.6, 2.7, -1.7] and lights[0].intensity[0] == 10
+    assert notes == ("camera and lights taken from room.vpltune.toml",)
+
+    camera, lights, notes = resolve_camera_and_lights(in_file, scene_path, view.camera, view.lights)
+    assert camera is view.camera and lights is view.lights and notes == ()
+
+
+def test_the_files_own_camera_and_light_are_kept():
+    for path in OWN_SCENES:
+        scene = read_scene(path)
+        camera, lights, notes = resolve_camera_and_lights(scene, path, None, None)
+        assert camera is scene.cameras[0] and lights is scene.lights and notes == ()
+
+
+def test_a_file_with_a_light_only_gets_a_camera_that_sees_what_is_lit():
+    path = next(path for path in OWN_SCENES if path.stem == "gallery")
+    full = read_scene(path)
+    # Behind the partition, where the automatic camera on its own does not look.
+    lamp = Light("point", np.ones(3), np.array([4.6, 2.0, 1.0]))
+    camera, lights, notes = resolve_camera_and_lights(with_lights(full, lamp), path, None, None)
+    space = free_space(full)
+    assert lights == (lamp,)
+    assert lit_fraction(space, seen_by(space, camera), lights) > 0.1
+    assert any("the given light reaches" in note for note in notes)
+
+
+def test_a_light_of_the_file_that_lights_nothing_in_sight_is_replaced_and_that_is_said(tmp_path):
+    view = room_view()
+    above = Light("spot", np.ones(3), np.array([0.0, 50.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+    scene = with_lights(colored_room(), above)
+    _, lights, notes = resolve_camera_and_lights(scene, tmp_path / "room.glb", view.camera, None)
+    assert lights[0] is not above
+    assert "the file's light reaches nothing the camera sees" in notes[0]
+    assert "light chosen automatically" in notes[1]
+
+
+def test_a_scene_without_triangles_is_refused(tmp_path):
+    with pytest.raises(InputError, match="must have at least one triangle, got none"):
+        resolve_camera_and_lights(Scene("empty", (), (), ()), tmp_path / "empty.glb", None, None)

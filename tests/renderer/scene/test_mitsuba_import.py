@@ -1,0 +1,379 @@
+"""Mitsuba scenes imported without Mitsuba, and held against what Mitsuba itself makes of them."""
+
+import json
+import math
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from PIL import Image
+
+from vpltune import Runtime
+from vpltune.__main__ import run
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.mitsuba_import import read_mitsuba
+from vpltune.renderer.scene.mitsuba_import.emitters import MOST_LIGHTS
+from vpltune.renderer.scene.views import View
+
+SIZE = (96, 64)
+
+# Every shape and step of a transform, in names of version 0.5 and of version 3.
+SCENE = """<scene version="{version}">
+  <default name="tilt" value="25"/>
+  <sensor type="perspective">
+    <float name="fov" value="50"/>
+    <transform name="{to_world}"><lookat origin="0.5, 2, 9" target="0.2, 0.1, 0" up="0.1, 1, 0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="96"/><integer name="height" value="64"/></film>
+  </sensor>
+  <bsdf type="twosided" id="image"><bsdf type="diffuse">
+    <texture name="reflectance" type="bitmap"><string name="filename" value="tex/image.png"/></texture>
+  </bsdf></bsdf>
+  <bsdf type="twosided" id="green"><bsdf type="diffuse">
+    <rgb name="reflectance" value="0.1, 0.6, 0.2"/>
+  </bsdf></bsdf>
+  <shape type="rectangle">
+    <transform name="{to_world}">
+      <scale value="6"/><rotate x="1" angle="-90"/><translate y="-1.5"/>
+    </transform>
+    <ref id="image"/>
+  </shape>
+  <shape type="cube">
+    <transform name="{to_world}">
+      <scale x="0.7" y="0.5" z="0.6"/><rotate y="1" angle="$tilt"/><translate x="-2.6" y="0.3"/>
+    </transform>
+    <ref id="image"/>
+  </shape>
+  <shape type="sphere">
+    <point name="center" x="-0.6" y="0.4" z="0.5"/><float name="radius" value="0.8"/><ref id="image"/>
+  </shape>
+  <shape type="disk">
+    <transform name="{to_world}">
+      <matrix value="0.6 0 0.3 1.2 0 0.7 0 0.6 -0.3 0 0.6 0.2 0 0 0 1"/>
+    </transform>
+    <ref id="image"/>
+  </shape>
+  <shape type="cylinder">
+    <point name="p0" x="2.4" y="-0.6" z="0"/><point name="p1" x="2.9" y="1.2" z="-0.4"/>
+    <float name="radius" value="0.4"/><ref id="green"/>
+  </shape>
+  <shape type="obj">
+    <string name="filename" value="bent.obj"/>
+    <transform name="{to_world}"><scale value="0.5"/><translate x="0" y="1.9"/></transform><ref id="image"/>
+  </shape>
+  <shape type="ply">
+    <string name="filename" value="bent.ply"/>
+    <transform name="{to_world}"><scale value="0.5"/><translate x="1.6" y="2.1"/></transform><ref id="image"/>
+  </shape>
+  {more}
+</scene>"""
+OBJ = """v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 1
+vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"""
+PLY = """ply\nformat ascii 1.0\nelement vertex 4
+property float x\nproperty float y\nproperty float z\nproperty float u\nproperty float v
+element face 2\nproperty list uchar int vertex_indices\nend_header
+-1 -1 0 0 0\n1 -1 0 1 0\n1 1 0 1 1\n-1 1 1 0 1\n3 0 1 2\n3 0 2 3\n"""
+AREA_LIGHT = """<shape type="{shape}">
+  <transform name="to_world"><scale value="0.5"/><translate y="2"/></transform>{more}
+  <emitter type="area"><rgb name="radiance" value="4, 2, 1"/></emitter></shape>"""
+
+
+def scene_file(folder, text=None, version="3.0.0", more=""):
+    (folder / "tex").mkdir(exist_ok=True)
+    # Smooth, since the two renderers filter differently, and without symmetry.
+    v, u = np.mgrid[0:64, 0:64] / 63.0
+    image = np.stack([0.2 + 0.7 * u, 0.9 - 0.6 * v, 0.3 + 0.4 * u * v], axis=-1)
+    Image.fromarray((255 * image).astype(np.uint8)).save(folder / "tex" / "image.png")
+    (folder / "bent.obj").write_text(OBJ)
+    (folder / "bent.ply").write_text(PLY)
+    to_world = "toWorld" if version.startswith("0") else "to_world"
+    path = folder / "scene.xml"
+    path.write_text(text or SCENE.format(version=version, to_world=to_world, more=more))
+    return path
+
+
+@pytest.mark.parametrize("version", ["0.5.0", "3.0.0"])
+def test_mitsuba_sees_the_same_surfaces_and_colours(tmp_path, version):
+    path = scene_file(tmp_path, version=version)
+    assert run(["import", str(path), "-o", str(tmp_path / "scene.glb")]) == 0
+    scene = read_scene(tmp_path / "scene.glb")
+    view = View("main", "fitted", SIZE, scene.cameras[0], ())
+    runtime = Runtime(scene, TunedConfig(ArtistParameters(vpl_count=1)), rsm_resolution=64)
+    depth, albedo, normal = (runtime.render(view, layer) for layer in ("depth", "albedo", "normal"))
+    their_depth, their_albedo, their_normal = _mitsuba_layers(path, view)
+    seen = their_depth > 0.0
+    assert (seen == (depth > 0.0)).mean() > 0.99
+    # Round shapes are polygons here: 0.1 % flatter. Pixels on outlines may see either side.
+    near = seen & (np.abs(depth - their_depth) < 0.01 * their_depth)
+    assert near.sum() > 0.97 * seen.sum()
+    assert np.abs(albedo - their_albedo)[near].mean() < 0.01
+    # Where an image repeats, at its borders, one texel or one pixel is smoothed.
+    assert np.quantile(np.abs(albedo - their_albedo)[near], 0.94) < 0.03
+    assert np.quantile(1.0 - (normal * their_normal).sum(axis=-1)[near], 0.97) < 0.002
+
+
+def _mitsuba_layers(path, view):
+    mi.set_variant("scalar_rgb")
+    scene = mi.load_file(str(path))
+    sensor = scene.sensors()[0]
+    width, height = view.size
+    depth, albedo, normal = (
+        np.zeros((height, width)),
+        np.zeros((height, width, 3)),
+        np.zeros((height, width, 3)),
+    )
+    eye, forward = view.camera.position_world, -view.camera.to_world[:3, 2]
+    for row in range(height):
+        for column in range(width):
+            place = [(column + 0.5) / width, (row + 0.5) / height]
+            ray, _ = sensor.sample_ray(0.0, 0.5, place, [0.5, 0.5])
+            hit = scene.ray_intersect(mi.Ray3f(ray))
+            if hit.is_valid():
+                depth[row, column] = (np.array(hit.p) - eye) @ forward
+                albedo[row, column] = np.array(hit.bsdf().eval_diffuse_reflectance(hit))
+                shading = np.array(hit.sh_frame.n)
+                normal[row, column] = shading if shading @ np.array(ray.d) < 0.0 else -shading
+    return depth, albedo, normal
+
+
+@pytest.mark.parametrize(
+    "lens",
+    [
+        '<float name="fov" value="40"/>',
+        '<float name="fov" value="40"/><string name="fov_axis" value="y"/>',
+        '<float name="fov" value="40"/><string name="fov_axis" value="smaller"/>',
+        '<float name="fov" value="40"/><string name="fov_axis" value="larger"/>',
+        '<float name="fov" value="40"/><string name="fov_axis" value="diagonal"/>',
+        '<string name="focal_length" value="35mm"/>',
+    ],
+)
+def test_every_way_to_give_the_angle_of_view(tmp_path, lens):
+    sensor = f"""<sensor type="perspective">{lens}
+      <film type="hdrfilm"><integer name="width" value="320"/><integer name="height" value="200"/></film>
+      </sensor>"""
+    path = scene_file(tmp_path, f'<scene version="3.0.0">{sensor}<shape type="sphere"/></scene>')
+    mi.set_variant("scalar_rgb")
+    x_fov = math.radians(float(np.array(mi.traverse(mi.load_file(str(path)).sensors()[0])["x_fov"]).item()))
+    yfov = read_mitsuba(path).cameras[0].yfov
+    assert yfov == pytest.approx(2.0 * math.atan(math.tan(x_fov / 2.0) * 200.0 / 320.0), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("shape", "kind", "area"),
+    [("rectangle", "spot", 1.0), ("disk", "spot", math.pi / 4), ("sphere", "point", math.pi)],
+)
+def test_an_area_light_keeps_its_flux(tmp_path, shape, kind, area):
+    path = scene_file(tmp_path, more=AREA_LIGHT.format(shape=shape, more=""))
+    scene = read_mitsuba(path)
+    (light,) = scene.lights
+    assert light.kind == kind
+    flux = math.pi * area * np.array([4.0, 2.0, 1.0])
+    # The cone's own fall-off, integrated over directions.
+    cosine = (np.arange(10_000) + 0.5) / 10_000
+    lobe = 4.0 * math.pi if kind == "point" else 2.0 * math.pi * float((cosine**2).mean())
+    # Polygons of 80 sides have 0.1 % less area than circles, and spheres of them 0.2 %.
+    np.testing.assert_allclose(light.intensity * lobe, flux, rtol=3e-3)
+    np.testing.assert_allclose(light.position_world, (0.0, 2.0, 0.0), atol=2e-3)
+    if kind == "spot":
+        np.testing.assert_allclose(light.direction_world, (0.0, 0.0, 1.0), atol=1e-12)
+        flipped = scene_file(
+            tmp_path, more=AREA_LIGHT.format(shape=shape, more='<boolean name="flip_normals" value="true"/>')
+        )
+        np.testing.assert_allclose(
+            read_mitsuba(flipped).lights[0].direction_world, (0.0, 0.0, -1.0), atol=1e-12
+        )
+
+
+def test_punctual_lights_come_over_as_they_are(tmp_path):
+    more = """
+      <emitter type="point"><point name="position" x="1" y="2" z="3"/>
+        <rgb name="intensity" value="4 5 6"/></emitter>
+      <emitter type="spot">
+        <transform name="to_world"><lookat origin="0 3 0" target="0 0 0" up="1 0 0"/></transform>
+        <rgb name="intensity" value="90"/><float name="cutoff_angle" value="40"/></emitter>
+      <emitter type="directional"><vector name="direction" x="1" y="-1" z="0"/>
+        <rgb name="irradiance" value="#ffffff"/></emitter>"""
+    point, spot, sun = read_mitsuba(scene_file(tmp_path, more=more)).lights
+    assert point.position_world.tolist() == [1.0, 2.0, 3.0] and point.intensity.tolist() == [4.0, 5.0, 6.0]
+    np.testing.assert_allclose(spot.direction_world, (0.0, -1.0, 0.0), atol=1e-12)
+    assert (spot.inner_cone, spot.outer_cone) == pytest.approx((math.radians(30.0), math.radians(40.0)))
+    np.testing.assert_allclose(sun.direction_world, (math.sqrt(0.5), -math.sqrt(0.5), 0.0))
+    np.testing.assert_allclose(sun.intensity, 1.0)
+
+
+def test_an_environment_becomes_a_sun_where_it_is_brightest(tmp_path):
+    sky = np.full((32, 64, 3), 0.1, np.float32)
+    sky[6, 20] = 500.0, 400.0, 300.0
+    mi.set_variant("scalar_rgb")
+    mi.Bitmap(sky).write(str(tmp_path / "sky.exr"))
+    more = """<emitter type="envmap"><string name="filename" value="sky.exr"/>
+      <transform name="to_world"><rotate y="1" angle="37"/></transform></emitter>"""
+    path = scene_file(tmp_path, more=more)
+    scene = read_mitsuba(path)
+    (sun,) = scene.lights
+    # Where Mitsuba itself says that the bright texel is.
+    environment = mi.load_file(str(path)).environment()
+    interaction = mi.SurfaceInteraction3f()
+    interaction.wi = mi.Vector3f(*sun.direction_world)
+    assert np.array(environment.eval(interaction)).mean() > 100.0
+    solid_angle = (2.0 * math.pi / 64) * (math.pi / 32) * math.sin(math.pi * 6.5 / 32)
+    np.testing.assert_allclose(sun.intensity, np.array([500.0, 400.0, 300.0]) * solid_angle, rtol=0.05)
+    assert any("one directional light" in line for line in scene.warnings)
+
+
+def test_what_cannot_be_brought_over_is_said(tmp_path):
+    more = (
+        '<shape type="sphere"><bsdf type="dielectric"/></shape>'
+        '<shape type="sphere"><bsdf type="mask"><bsdf type="roughplastic">'
+        '<rgb name="diffuse_reflectance" value="0.5"/></bsdf></bsdf></shape>'
+        '<shape type="sphere"><bsdf type="conductor"><string name="material" value="Au"/></bsdf></shape>'
+        '<emitter type="constant"/><medium type="homogeneous"/>'
+    )
+    said = "\n".join(read_mitsuba(scene_file(tmp_path, more=more)).warnings)
+    for part in ("glass or empty", "cut-out", "gloss", "metal", "constant environment", "media", "no light"):
+        assert part in said, part
+
+
+def test_shapes_wind_outwards(tmp_path):
+    for shape in ("rectangle", "cube", "sphere", "disk", "cylinder"):
+        scene = read_mitsuba(scene_file(tmp_path, f'<scene><shape type="{shape}"/></scene>'))
+        mesh = scene.meshes[0]
+        corners = mesh.positions[mesh.triangles].astype(np.float64)
+        by_winding = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        assert ((by_winding * mesh.normals[mesh.triangles].mean(axis=1)).sum(axis=1) > 0.0).all(), shape
+
+
+def test_only_the_strongest_lights_are_kept(tmp_path):
+    bulb = '<emitter type="point"><rgb name="intensity" value="{}"/></emitter>'
+    faint = "".join(bulb.format(1e-4) for _ in range(3))
+    equal = "".join(bulb.format(1.0) for _ in range(MOST_LIGHTS + 4))
+    few = read_mitsuba(scene_file(tmp_path, more=bulb.format(5.0) + faint))
+    assert len(few.lights) == 1 and "3 of 4 lights are left out" in few.warnings[-1]
+    many = read_mitsuba(scene_file(tmp_path, more=equal))
+    assert len(many.lights) == MOST_LIGHTS and "with 33.3% of the flux" in many.warnings[-1]
+
+
+def test_instances_place_the_shapes_of_their_group(tmp_path):
+    text = """<scene version="3.0.0">
+      <shape type="shapegroup" id="pair"><shape type="cube"/>
+        <shape type="disk"><transform name="to_world"><translate z="5"/></transform></shape></shape>
+      <shape type="instance"><ref id="pair"/><transform name="to_world"><translate x="9"/></transform></shape>
+      <shape type="instance"><ref id="pair"/></shape></scene>"""
+    scene = read_mitsuba(scene_file(tmp_path, text))
+    places = sorted(tuple(instance.to_world[:3, 3]) for instance in scene.instances)
+    assert places == [(0.0, 0.0, 0.0), (0.0, 0.0, 5.0), (9.0, 0.0, 0.0), (9.0, 0.0, 5.0)]
+    assert len(scene.meshes) == 2
+
+
+BOMB = """<?xml version="1.0"?><!DOCTYPE scene [<!ENTITY a "aaaaaaaaaa">
+<!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;"><!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;&b;&b;">]>
+<scene version="3.0.0"><string name="x" value="&c;"/></scene>"""
+REFUSED = {
+    "entity bomb": (BOMB, "DOCTYPE scene"),
+    "external entity": (
+        '<!DOCTYPE scene SYSTEM "file:///etc/passwd"><scene version="3.0.0"/>',
+        "DOCTYPE scene",
+    ),
+    "not XML": ("<scene version='3.0.0'>", "not XML"),
+    "empty": (" ", "not XML"),
+    "not a scene": ("<svg/>", "line 1: <svg>: a Mitsuba scene's outermost element is <scene>"),
+    "deep": ("<scene>" + '<bsdf type="twosided">' * 100, "at most 64 deep"),
+    "no shapes": ('<scene version="3.0.0"/>', "the scene has no triangles"),
+    "shape": (
+        '<scene><shape type="hair"/></scene>',
+        "line 1: shape 'hair': shapes of this type are not read",
+    ),
+    "material": ('<scene><shape type="cube"><bsdf type="velvet"/></shape></scene>', "bsdf 'velvet'"),
+    "emitter": ('<scene><shape type="cube"/><emitter type="sunsky"/></scene>', "emitter 'sunsky'"),
+    "element": ('<scene><shape type="cube"><wheel name="a"/></shape></scene>', "<wheel>: such an element"),
+    "no type": ("<scene><shape/></scene>", "attribute 'type' is missing"),
+    "file": (
+        '<scene><shape type="obj"><string name="filename" value="a.obj"/></shape></scene>',
+        "'a.obj' is not there",
+    ),
+    "file outside": (
+        '<scene><shape type="obj"><string name="filename" value="../a.obj"/></shape></scene>',
+        "must stay inside the scene's folder",
+    ),
+    "bad file": (
+        '<scene><shape type="ply"><string name="filename" value="bent.obj"/></shape></scene>',
+        "'bent.obj': ",
+    ),
+    "texture": (
+        '<scene><shape type="cube"><bsdf type="diffuse"><texture name="reflectance" type="bitmap">'
+        '<string name="filename" value="none.png"/></texture></bsdf></shape></scene>',
+        "none.png",
+    ),
+    "NaN": (
+        '<scene><shape type="sphere"><float name="radius" value="nan"/></shape></scene>',
+        "value must be 1 finite number, got 'nan'",
+    ),
+    "radius 0": (
+        '<scene><shape type="sphere"><float name="radius" value="0"/></shape></scene>',
+        "above zero",
+    ),
+    "flat": (
+        '<scene><shape type="cube"><transform name="to_world"><scale y="0"/></transform></shape></scene>',
+        "must be finite and have an inverse",
+    ),
+    "default": (
+        '<scene><shape type="sphere"><float name="radius" value="$r"/></shape></scene>',
+        "has no <default>",
+    ),
+    "reference": (
+        '<scene><shape type="cube"><ref id="m"/></shape></scene>',
+        "nothing before it has the id 'm'",
+    ),
+    "negative": (
+        '<scene><shape type="cube"><bsdf type="diffuse"><rgb name="reflectance" value="-1"/>'
+        "</bsdf></shape></scene>",
+        "must not be negative",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "message"), REFUSED.values(), ids=REFUSED)
+def test_refusals_are_one_line_that_names_the_file(tmp_path, capfd, text, message):
+    path = scene_file(tmp_path, text)
+    with pytest.raises(InputError) as refusal:
+        read_mitsuba(path)
+    assert str(refusal.value).startswith(f"{path}: ") and message in str(refusal.value)
+    assert run(["import", str(path), "-o", str(tmp_path / "out.glb")]) == 2
+    assert capfd.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "out.glb").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["a.glb", "-o", "b.glb"], "a.glb: a Mitsuba scene ends in .xml"),
+        (["a.xml", "-o", "b.gltf"], "b.gltf: the file name must end in .glb"),
+        (["absent.xml", "-o", "b.glb"], "absent.xml: cannot be read"),
+    ],
+)
+def test_names_are_looked_at_first(tmp_path, capfd, monkeypatch, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    assert run(["import", *arguments]) == 2
+    assert message in capfd.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "triangles", "lights"),
+    [("bitterli-living-room", 131_807, 1), ("bitterli-staircase2", 28_859, 4)],
+)
+def test_the_shared_scenes_come_over(scenes_folder, tmp_path, capfd, name, triangles, lights):
+    output = tmp_path / "scene.glb"
+    assert run(["import", str(scenes_folder / name / "scene.xml"), "-o", str(output), "--json"]) == 0
+    report = json.loads(capfd.readouterr().out)
+    assert (report["triangles"], report["lights"], report["cameras"]) == (triangles, lights, 1)
+    scene = read_scene(output)
+    assert scene.triangle_count() == triangles
+    assert report["approximated"] == list(json.loads(_glb_json(output))["asset"]["extras"]["notes"])
+
+
+def _glb_json(path):
+    content = path.read_bytes()
+    return content[20 : 20 + int.from_bytes(content[12:16], "little")]

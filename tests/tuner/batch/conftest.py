@@ -1,0 +1,48 @@
+"""A small library, jobs over it, and a cache that is not the user's."""
+
+import hashlib
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import vpltune.tuner.scene_fit.fit_scene
+from vpltune.renderer.config.tuned_config import TunedConfig, config_text
+from vpltune.tuner.batch.job import Job, JobOptions
+
+CORNELL_BOX = Path(__file__).resolve().parents[3] / "configs" / "scenes" / "cornell-box.glb"
+
+
+@pytest.fixture
+def make_job(tmp_path):
+    """A job over a scene file with a few bytes in it, or over `scene`."""
+
+    def make(name: str = "room.glb", scene: Path | None = None, size: int = 1) -> Job:
+        if scene is None:
+            scene = tmp_path / "library" / name
+            scene.parent.mkdir(exist_ok=True)
+            scene.write_bytes(b"no scene")
+        key = hashlib.sha256(str(scene).encode()).hexdigest()
+        options = JobOptions(start=config_text(TunedConfig()), views=1, size=(32, 24))
+        return Job(key, str(scene), name, str(tmp_path / "out"), options, size)
+
+    return make
+
+
+@pytest.fixture
+def fits(monkeypatch):
+    """Takes the place of a fit: which scenes were fitted, and what each ends with."""
+    log = SimpleNamespace(scenes=[], error=None, status="improved", files={"tuned.json": "{}"})
+
+    def fit_scene(scene_path, output, options, progress):
+        log.scenes.append(scene_path.name)
+        if log.error is not None:
+            raise log.error
+        output.mkdir(parents=True)
+        for name, content in log.files.items():
+            (output / name).write_text(content)
+        seconds = {"fit": 1.0, "total": 2.0}
+        return SimpleNamespace(document={"status": log.status, "sentence": "settled", "seconds": seconds})
+
+    monkeypatch.setattr(vpltune.tuner.scene_fit.fit_scene, "fit_scene", fit_scene)
+    return log

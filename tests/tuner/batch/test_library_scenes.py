@@ -1,0 +1,166 @@
+"""What counts as a scene of a library, and what its key hangs on."""
+
+import os
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from scene_paths import OUTSIDE_SCENES
+
+from vpltune.renderer.config.tuned_config import TunedConfig, config_text
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.files.scene_folder import SceneFolder
+from vpltune.tuner.batch.job import JobOptions
+from vpltune.tuner.batch.job_key import SceneInputs, job_key
+from vpltune.tuner.batch.referred_files import referred_files
+from vpltune.tuner.batch.scene_files import library_scenes
+
+XML = b'<?xml version="1.0"?><scene version="3.0.0"><string name="filename" value="parts/a.obj"/></scene>'
+
+
+def library_of(folder, **files):
+    for name, content in files.items():
+        path = folder / name.replace("__", "/").replace("_", ".")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    return folder
+
+
+def test_scenes_below_a_folder_are_found_and_parts_of_others_are_not(tmp_path):
+    library_of(
+        tmp_path,
+        b_glb=b"",
+        deep__er__a_PLY=b"",
+        mitsuba__scene_xml=XML,
+        mitsuba__parts__a_obj=b"",
+        mitsuba__parts__b_obj=b"",
+        other_xml=b"<project/>",
+        out__old_glb=b"",
+        readme_txt=b"",
+    )
+    (tmp_path / ".hidden").mkdir()
+    (tmp_path / ".hidden" / "c.glb").touch()
+    found = library_scenes(tmp_path, leave_out=tmp_path / "out")
+    assert list(found) == ["b.glb", "deep/er/a.PLY", "mitsuba/parts/b.obj", "mitsuba/scene.xml"]
+    assert found["deep/er/a.PLY"] == tmp_path / "deep/er/a.PLY"
+
+
+def test_a_list_names_scenes_relative_to_itself(tmp_path):
+    listing = tmp_path / "list.txt"
+    listing.write_text("# mine\n\nrooms/a.glb\n/elsewhere/b.obj\n")
+    found = library_scenes(listing, leave_out=tmp_path)
+    assert found == {"rooms/a.glb": tmp_path / "rooms/a.glb", "/elsewhere/b.obj": Path("/elsewhere/b.obj")}
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(b"# nothing\n", "names no scene"), (b"\xff\xfe\x00", "not UTF-8 text")],
+)
+def test_a_list_that_is_none_is_refused(tmp_path, content, message):
+    (tmp_path / "list.txt").write_bytes(content)
+    with pytest.raises(InputError, match=message):
+        library_scenes(tmp_path / "list.txt", leave_out=tmp_path)
+
+
+@pytest.mark.parametrize("name", OUTSIDE_SCENES)
+def test_every_file_that_a_reader_opens_is_named(scenes_folder, monkeypatch, name):
+    """Else a scene would not be fitted again when that file changes."""
+    opened = []
+    read = SceneFolder._read
+
+    def spy(self, path, subject):
+        opened.append(Path(path).resolve())
+        return read(self, path, subject)
+
+    monkeypatch.setattr(SceneFolder, "_read", spy)
+    scene = scenes_folder / name / OUTSIDE_SCENES[name]
+    read_scene(scene)
+    named = {path.resolve() for path in referred_files(scene)}
+    assert set(opened) - {scene.resolve()} <= named
+
+
+def digest(scene):
+    return SceneInputs(scene.parent / "absent").digest(scene)[0]
+
+
+def test_the_key_follows_every_file_of_the_scene(tmp_path):
+    """Its own bytes, its library, a map that the library names with options and spaces, and its sidecar."""
+    scene = tmp_path / "a.obj"
+    scene.write_text("mtllib my own.mtl\nv 0 0 0\n")
+    (tmp_path / "my own.mtl").write_text("newmtl a\nmap_Kd -s 1 1 1 dark wood.png\n")
+    seen = {digest(scene)}
+    for name in ("dark wood.png", "a.vpltune.toml", "my own.mtl", "a.obj"):
+        with (tmp_path / name).open("a") as file:
+            file.write("#\n")
+        seen.add(digest(scene))
+    assert len(seen) == 5
+
+
+def test_the_key_is_the_same_wherever_the_scene_lies(tmp_path):
+    library_of(tmp_path, one__a_glb=b"same", two__b_glb=b"same", two__b_ply=b"same")
+    assert digest(tmp_path / "one/a.glb") == digest(tmp_path / "two/b.glb") != digest(tmp_path / "two/b.ply")
+
+
+def test_files_out_of_the_folder_and_devices_are_not_opened(tmp_path):
+    scene = tmp_path / "in" / "a.gltf"
+    scene.parent.mkdir()
+    scene.write_text('{"buffers": [{"uri": "../b.bin"}, {"uri": "pipe"}], "images": [{"uri": "data:,x"}, 3]}')
+    (tmp_path / "b.bin").touch()
+    os.mkfifo(scene.parent / "pipe")
+    assert referred_files(scene) == (scene.parent / "pipe",)
+    assert digest(scene)
+
+
+def test_digests_are_kept_until_a_file_changes(tmp_path, monkeypatch):
+    scene = tmp_path / "a.glb"
+    scene.write_bytes(b"one")
+    long_ago = time.time() - 60
+    # A file's time of change cannot be set back, so the clock is set forward.
+    monkeypatch.setattr(time, "time_ns", lambda: int((long_ago + 120) * 1e9))
+    inputs = SceneInputs(tmp_path)
+    first = inputs.digest(scene)
+    inputs.save()
+    hashed = []
+    monkeypatch.setattr(
+        "vpltune.tuner.batch.job_key._file_digest", lambda path: hashed.append(path.name) or "changed"
+    )
+    assert SceneInputs(tmp_path).digest(scene) == first
+    assert not hashed
+    (tmp_path / "a.vpltune.toml").touch()
+    assert SceneInputs(tmp_path).digest(scene) != first
+    assert hashed == ["a.glb", "a.vpltune.toml"]
+    (tmp_path / "inputs.json").write_text("{")
+    assert SceneInputs(tmp_path).digest(scene)
+
+
+def test_a_file_just_changed_is_not_trusted(tmp_path):
+    """Within one tick of its clock it could change again and look the same."""
+    (tmp_path / "a.glb").write_bytes(b"one")
+    inputs = SceneInputs(tmp_path)
+    inputs.digest(tmp_path / "a.glb")
+    inputs.save()
+    assert not (tmp_path / "inputs.json").exists()
+
+
+def test_the_key_follows_options_but_not_where_the_start_came_from():
+    plain = JobOptions(start=config_text(TunedConfig()))
+    sourced = replace(plain, start=config_text(TunedConfig(provenance={"scene": "other"})))
+    assert job_key("d", plain) == job_key("d", sourced)
+    others = [
+        replace(plain, views=3),
+        replace(plain, seed=1),
+        replace(plain, bounces="all"),
+        replace(plain, size=(64, 48)),
+        replace(plain, start=config_text(TunedConfig(visibility="none"))),
+    ]
+    assert len({job_key("d", options) for options in [plain, *others]} | {job_key("e", plain)}) == 7
+
+
+def test_scenes_of_others_are_found_and_what_is_left_is_mitsubas(scenes_folder, tmp_path):
+    """The meshes of Mitsuba scenes, 80 OBJ files, are no scenes of their own."""
+    found = set(library_scenes(scenes_folder, leave_out=tmp_path))
+    tuned = {f"{folder}/{file}" for folder, file in OUTSIDE_SCENES.items()}
+    assert tuned < found
+    assert {Path(name).name for name in found - tuned} == {"scene.xml"}

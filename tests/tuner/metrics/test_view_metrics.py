@@ -1,0 +1,71 @@
+"""Figures of an image: relative ones have no value where nothing is there to be relative to."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from built_scenes import colored_room, room_view
+from own_reference import own_reference
+
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.tuner.metrics.view_metrics import (
+    ViewMetrics,
+    energy_ratio,
+    mean_metrics,
+    median_error,
+    relmse,
+    trimmed_relmse,
+)
+from vpltune.tuner.surrogate.captured_view import CapturedView
+
+GREY, BLACK = np.full((4, 3), 0.5, np.float32), np.zeros((4, 3), np.float32)
+
+
+def test_of_a_grey_picture():
+    """Half as bright: (0.5 − 0.25)² / (0.5² + 0.01·0.5²) = 0.25/1.01."""
+    assert relmse(0.5 * GREY, GREY) == pytest.approx(0.25 / 1.01)
+    assert energy_ratio(0.5 * GREY, GREY) == pytest.approx(0.5)
+    assert median_error(0.5 * GREY, GREY) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("picture", [GREY, BLACK])
+def test_against_a_black_reference_there_is_no_value(picture):
+    assert math.isnan(relmse(picture, BLACK))
+    assert math.isnan(energy_ratio(picture, BLACK))
+    assert math.isnan(median_error(picture, BLACK))
+    assert all(math.isnan(value) for value in trimmed_relmse(picture, BLACK))
+
+
+def test_without_the_worst_pixel_in_a_thousand():
+    """2,000 pixels off by 1 %, two of them by a factor of 11: the two hold all but a thousandth of relMSE."""
+    reference = np.ones((2000, 3), np.float32)
+    picture = 1.01 * reference
+    picture[[7, 1234]] = 11.0
+    trimmed, share = trimmed_relmse(picture, reference)
+    assert trimmed == pytest.approx(1e-4 / 1.01, rel=1e-3)
+    assert share == pytest.approx(1.0 - 1998 * 1e-4 / (1998 * 1e-4 + 200.0), rel=1e-6)
+    assert median_error(picture, reference) == pytest.approx(0.01, rel=1e-3)
+
+
+def test_a_pixel_alone_is_kept_and_no_error_has_no_worst():
+    assert trimmed_relmse(2.0 * GREY[:1], GREY[:1])[0] == relmse(2.0 * GREY[:1], GREY[:1])
+    assert trimmed_relmse(GREY, GREY) == (0.0, 0.0)
+
+
+def test_the_mean_is_over_views_that_have_a_value():
+    unlit = ViewMetrics(math.nan, math.nan, math.nan, math.nan, math.nan, 0.5)
+    lit = ViewMetrics(0.25, 0.125, 0.5, 0.1, 1.5, 0.25)
+    assert mean_metrics([unlit, lit]) == ViewMetrics(0.25, 0.125, 0.5, 0.1, 1.5, 0.375)
+    assert math.isnan(mean_metrics([unlit, unlit]).relmse)
+
+
+def test_flip_compares_light_and_not_textures(gl_context):
+    """A reference with another albedo, as texture filtering gives it, and the same light: FLIP is 0."""
+    runtime = Runtime(colored_room(), "default", rsm_resolution=128, context=gl_context)
+    view = room_view("spot")
+    captured = runtime.capture(view)
+    noise = np.random.default_rng(0).uniform(0.2, 1.0, captured.albedo.shape).astype(np.float32)
+    seen = CapturedView(view, replace(own_reference(captured), albedo=noise), captured)
+    assert seen.metrics(captured.indirect_irradiance).flip < 1e-6
+    assert seen.metrics(0.5 * captured.indirect_irradiance).flip > 0.01

@@ -1,0 +1,55 @@
+"""A scene's captures are kept for as long as they are what would be captured anew."""
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from own_reference import own_reference
+
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.runtime import DEFAULT_OPTIONS, Runtime
+from vpltune.tuner.prior import prior_library
+from vpltune.tuner.prior.loss_table import default_point, table_loss
+from vpltune.tuner.prior.scene_generator import generated_scene
+
+MOVES = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.1, 0.2, 0.0], [0.05, -0.1, 0.0, -0.3]], np.float32)
+"""From the defaults."""
+LOSSES = (0.027439, 0.034081, 0.034132)
+STATISTICS = (
+    *(0.9304, 0.37042, 0.11179, 0.53959, 0.58801, 0.54732),
+    *(0.27946, 0.61551, 0.23385, 0.31606, 0.20528, 0.3125),
+)
+
+
+def test_what_the_runtime_does_otherwise_is_another_capture(monkeypatch):
+    scene = generated_scene(0)
+    views = prior_library.prior_views(scene)
+    before = prior_library._key(scene, views)
+    assert prior_library._key(scene, views) == before
+    coarse = replace(DEFAULT_OPTIONS, visibility_map_refinement=1)
+    monkeypatch.setattr(prior_library, "DEFAULT_OPTIONS", coarse)
+    assert prior_library._key(scene, views) != before
+
+
+def test_captures_are_those_of_their_version(gl_context, monkeypatch):
+    """What one scene was captured as under `CAPTURE_VERSION`. Should this fail, others' caches hold captures
+    that are no longer true: raise the version, and put the new numbers here. The tolerance is what another
+    driver may round to."""
+    gl_context.__enter__()
+    monkeypatch.setattr(prior_library, "ROTATIONS", {32: ((0.0, 0.0),)})
+    scene = generated_scene(0)
+    views = prior_library.prior_views(scene)[:1]
+    through_walls = Runtime(
+        scene, TunedConfig(ArtistParameters(), visibility="none"), context=gl_context, rsm_resolution=128
+    )
+    found = prior_library._captured(
+        gl_context, scene, views, (own_reference(through_walls.capture(views[0])),)
+    )
+    table = jax.tree.map(lambda values: jnp.asarray(values[0]), found.table)
+    point = default_point(ArtistParameters())
+    losses = [float(table_loss(table, point + move)) for move in MOVES]
+    print(losses, [round(float(v), 5) for v in found.statistics[0]])
+    np.testing.assert_allclose(losses, LOSSES, rtol=5e-3)
+    np.testing.assert_allclose(found.statistics[0], STATISTICS, atol=2e-3)

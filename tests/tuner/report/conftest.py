@@ -1,0 +1,36 @@
+"""One real fit, small, and one browser, for all tests of pages."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+from headless_chromium import headless_chromium
+
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
+
+SCENE = Path(__file__).resolve().parents[3] / "configs" / "scenes" / "cornell-box.glb"
+
+
+@pytest.fixture(scope="session")
+def fitted_folder(tmp_path_factory) -> Path:
+    """What `vpltune fit` leaves of the shipped Cornell box, with few VPLs and pixels."""
+    from vpltune.tuner.scene_fit.fit_scene import FitOptions, fit_scene
+
+    folder = tmp_path_factory.mktemp("report") / "fit"
+    start = TunedConfig(ArtistParameters(vpl_count=64))
+    options = FitOptions(start=start, views=1, size=(64, 48), command="vpltune fit box.glb -o 'my out'")
+    fit_scene(SCENE, folder, options, lambda stage, share: None)
+    return folder
+
+
+@pytest.fixture
+def fit_copy(fitted_folder, tmp_path) -> Path:
+    """A copy that a test may change."""
+    return Path(shutil.copytree(fitted_folder, tmp_path / "fit"))
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    with headless_chromium() as browser:
+        yield browser

@@ -1,0 +1,106 @@
+"""The key of a scene's record: a hash of every byte that its fit depends on.
+
+Files are hashed once: what was found is kept in `inputs.json` in the batch folder, and holds as long as
+size and times of change of every file are as they were. That file is a help and no truth: without it,
+everything is hashed again.
+"""
+
+import contextlib
+import hashlib
+import importlib.metadata
+import json
+import os
+import stat
+import time
+from dataclasses import asdict
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from vpltune.renderer.config.tuned_config import parse_config
+from vpltune.renderer.files.atomic_file import write_text_whole
+from vpltune.tuner.batch.job import JobOptions
+from vpltune.tuner.batch.referred_files import referred_files
+
+KEY_VERSION = 2
+"""Raise when a record of the same inputs would say something else: old records are then passed over."""
+SETTLED_SECONDS = 2.0
+"""A file changed so shortly before it was hashed could change again within one tick of its clock."""
+
+Stamp = list[int] | None
+"""Size, and times of change of content and of anything, in ns; None for what is not there."""
+
+
+class SceneInputs:
+    """Digests of scenes and of all that they refer to."""
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / "inputs.json"
+        self._known: dict[str, list[list[Any]]] = {}
+        self._new = False
+        with contextlib.suppress(OSError, ValueError):
+            known = json.loads(self._path.read_text(encoding="utf-8"))
+            self._known = known if isinstance(known, dict) else {}
+
+    def digest(self, scene: Path) -> tuple[str, int]:
+        """Hash of the scene's file, its sidecar and what it refers to; and how many bytes these are."""
+        entries = self._known.get(str(scene))
+        if entries is None or any(_stamp(Path(path)) != stamp for path, stamp, _ in entries):
+            entries = self._hashed(scene)
+        parts = [digest for _, _, digest in entries]
+        text = json.dumps([scene.suffix.lower(), *parts])
+        return hashlib.sha256(text.encode()).hexdigest(), sum(stamp[0] for _, stamp, _ in entries if stamp)
+
+    def save(self) -> None:
+        """Keep what was found; a folder that cannot be written to shows itself soon enough."""
+        if self._new:
+            write_text_whole(self._path, json.dumps(self._known) + "\n")
+            self._new = False
+
+    def _hashed(self, scene: Path) -> list[list[Any]]:
+        # As `renderer.scene.placement` names it, which takes half a second to import.
+        sidecar = scene.with_suffix(".vpltune.toml")
+        began = time.time_ns()
+        entries = []
+        for path in (scene, sidecar, *referred_files(scene)):
+            stamp = _stamp(path)
+            entries.append([str(path), stamp, None if stamp is None else _file_digest(path)])
+        latest = max((max(stamp[1:]) for _, stamp, _ in entries if stamp), default=0)
+        if began - latest > SETTLED_SECONDS * 1e9:
+            self._known[str(scene)] = entries
+            self._new = True
+        return entries
+
+
+def job_key(content_digest: str, options: JobOptions) -> str:
+    """Hash of a scene's content, the options of its fit and the versions of what fits it."""
+    return hashlib.sha256(f"{content_digest} {_settings(options)}".encode()).hexdigest()
+
+
+@lru_cache
+def _settings(options: JobOptions) -> str:
+    start = parse_config(options.start, "the start of the fit")
+    settings = asdict(options) | {"start": start.parameters.as_dict(), "visibility": start.visibility}
+    if start.auto is not None:
+        settings["auto"] = start.auto.as_dict()
+    versions = {name: importlib.metadata.version(name) for name in ("vpltune", "jax", "mitsuba")}
+    return json.dumps({"key": KEY_VERSION, "options": settings, "versions": versions}, sort_keys=True)
+
+
+def _stamp(path: Path) -> Stamp:
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    # Devices and pipes are no scenes, and are never opened.
+    regular = stat.S_ISREG(found.st_mode)
+    return [found.st_size, found.st_mtime_ns, found.st_ctime_ns] if regular else None
+
+
+def _file_digest(path: Path) -> str | None:
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        with os.fdopen(handle, "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return None

@@ -1,0 +1,77 @@
+"""The scheduler of one machine: a few tuning processes, each looked after by a thread."""
+
+import queue
+import threading
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from vpltune.tuner.batch.attempts import tune_with_retries
+from vpltune.tuner.batch.job import Job
+from vpltune.tuner.batch.supervised_process import Limits, StoppedError, SupervisedProcess
+
+BUSY_SECONDS = 1.0
+"""Until a scene that another run is working on is looked at again."""
+
+Event = dict[str, Any]
+
+
+def tune_locally(jobs: Sequence[Job], workers: int, threads: int, limits: Limits) -> Iterator[Event]:
+    """Tune `jobs`, begun in their order, and yield what happens: every job ends with a `record` event.
+
+    Left early, by an exception or by closing the iterator, it ends every process that it started.
+
+    Raises:
+        MachineError: this machine cannot fit anything.
+    """
+    waiting: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
+    events: queue.SimpleQueue[Event | BaseException] = queue.SimpleQueue()
+    stopped = threading.Event()
+    for job in jobs:
+        waiting.put(job)
+    crew = [
+        threading.Thread(target=_serve, args=(waiting, events, stopped, threads, limits), daemon=True)
+        for _ in range(min(workers, len(jobs)))
+    ]
+    for thread in crew:
+        thread.start()
+    left = len(jobs)
+    try:
+        while left:
+            event = events.get()
+            if isinstance(event, BaseException):
+                raise event
+            left -= event["event"] == "record"
+            yield event
+    finally:
+        stopped.set()
+        for _ in crew:
+            waiting.put(None)
+        for thread in crew:
+            thread.join()
+
+
+def _serve(
+    waiting: "queue.SimpleQueue[Job | None]",
+    events: "queue.SimpleQueue[Event | BaseException]",
+    stopped: threading.Event,
+    threads: int,
+    limits: Limits,
+) -> None:
+    process = SupervisedProcess(threads, stopped)
+    try:
+        while not stopped.is_set() and (job := waiting.get()) is not None:
+            events.put({"event": "scene_started", "key": job.key, "name": job.name})
+            record = tune_with_retries(process, job, limits, events.put)
+            if record is None:
+                stopped.wait(BUSY_SECONDS)
+                waiting.put(job)
+            else:
+                events.put({"event": "record", **asdict(record)})
+    except StoppedError:
+        pass
+    # Whatever it is, the batch ends with it, in the thread that can tell the user.
+    except BaseException as error:
+        events.put(error)
+    finally:
+        process.close()

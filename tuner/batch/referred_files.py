@@ -1,0 +1,119 @@
+"""Which files a scene file may refer to: a quick look at its text, not a reader.
+
+It names rather too many than too few: a file too many only means that a scene is fitted again when that
+file changes. Names that lead out of the scene's folder are left out, as the readers refuse them.
+"""
+
+import json
+import re
+import stat
+import struct
+import urllib.parse
+from collections.abc import Iterator
+from pathlib import Path
+
+from vpltune.renderer.scene.files.limits import MAX_FILE_BYTES
+
+READ_SUFFIXES = (".gltf", ".glb", ".obj", ".ply")
+"""Of the scenes that can be read."""
+MITSUBA_SUFFIX = ".xml"
+
+_GLB_HEADER = struct.Struct("<4sIIII")
+_XML_VALUE = re.compile(rb'value\s*=\s*"([^"]+\.[A-Za-z0-9]{2,4})"')
+_MTLLIB = re.compile(rb"^[ \t]*mtllib[ \t]+([^\r\n]+)", re.MULTILINE)
+_MAP = re.compile(rb"^[ \t]*map_Kd[ \t]+([^\r\n]+)", re.MULTILINE | re.IGNORECASE)
+_TEXTURE_FILE = re.compile(rb"^comment[ \t]+TextureFile[ \t]+([^\r\n]+)", re.MULTILINE)
+_PLY_HEADER_BYTES = 1 << 16
+
+
+def referred_files(scene: Path) -> tuple[Path, ...]:
+    """Files that `scene` names, each once, in the order they are named; some may not exist."""
+    found = dict.fromkeys(
+        path for name in _names(scene) if (path := _inside(scene.parent, name)) is not None and path != scene
+    )
+    return tuple(found)
+
+
+def is_mitsuba_scene(path: Path) -> bool:
+    """Whether an XML file is a Mitsuba scene, from its beginning."""
+    return re.search(rb"<scene\b", _content(path, 4096)) is not None
+
+
+def _names(scene: Path) -> Iterator[str]:
+    suffix = scene.suffix.lower()
+    if suffix == ".gltf":
+        yield from _gltf_uris(_content(scene))
+    elif suffix == ".glb":
+        yield from _gltf_uris(_glb_json(scene))
+    elif suffix == ".obj":
+        yield from _obj_names(scene)
+    elif suffix == ".ply":
+        for line in _TEXTURE_FILE.findall(_content(scene, _PLY_HEADER_BYTES)):
+            yield from _tails(line)
+    elif suffix == MITSUBA_SUFFIX:
+        for value in _XML_VALUE.findall(_content(scene)):
+            yield value.decode("utf-8", "replace")
+
+
+def _glb_json(scene: Path) -> bytes:
+    """The JSON chunk alone: the rest of a .glb may be large."""
+    head = _content(scene, _GLB_HEADER.size)
+    if len(head) < _GLB_HEADER.size:
+        return b""
+    length = _GLB_HEADER.unpack(head)[3]
+    return _content(scene, _GLB_HEADER.size + length)[_GLB_HEADER.size :]
+
+
+def _gltf_uris(content: bytes) -> Iterator[str]:
+    try:
+        document = json.loads(content)
+    except (ValueError, RecursionError):
+        return
+    if not isinstance(document, dict):
+        return
+    for kind in ("buffers", "images"):
+        members = document.get(kind)
+        for member in members if isinstance(members, list) else ():
+            uri = member.get("uri") if isinstance(member, dict) else None
+            if isinstance(uri, str) and uri[:5].lower() != "data:":
+                yield uri
+                yield urllib.parse.unquote(uri)
+
+
+def _obj_names(scene: Path) -> Iterator[str]:
+    for line in _MTLLIB.findall(_content(scene)):
+        # One name that may hold spaces, or several.
+        for name in (line, *line.split()):
+            library = _inside(scene.parent, text := name.decode("utf-8", "replace").strip())
+            if library is None:
+                continue
+            yield text
+            for mapped in _MAP.findall(_content(library)):
+                yield from _tails(mapped)
+
+
+def _tails(line: bytes) -> Iterator[str]:
+    """The line from each of its words on: options stand before a name, and a name may hold spaces."""
+    text = line.decode("utf-8", "replace").strip()
+    for word in re.finditer(r"\S+", text):
+        yield text[word.start() :]
+
+
+def _inside(folder: Path, name: str) -> Path | None:
+    root = folder.resolve()
+    try:
+        path = (root / name.replace("\\", "/")).resolve()
+    except (OSError, RuntimeError, ValueError):  # a name too long, a loop of links, a null byte
+        return None
+    return folder / path.relative_to(root) if path.is_relative_to(root) and path != root else None
+
+
+def _content(path: Path, limit: int = MAX_FILE_BYTES) -> bytes:
+    """The first bytes of a regular file; nothing where there is none."""
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            return b""
+        with path.open("rb") as file:
+            return file.read(limit)
+    except OSError:
+        return b""

@@ -1,0 +1,63 @@
+"""The scenes of a library: everything below a folder, or what a list names."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from vpltune.renderer.errors import InputError
+from vpltune.tuner.batch.referred_files import MITSUBA_SUFFIX, READ_SUFFIXES, is_mitsuba_scene, referred_files
+
+LONGEST_LIST_BYTES = 1 << 28
+
+
+def library_scenes(library: Path, leave_out: Path) -> dict[str, Path]:
+    """Name and absolute path of every scene, in the order of names, or of the list.
+
+    A file that a Mitsuba scene refers to is part of it, and no scene of its own. Folders and files
+    whose name begins with a dot, and the folder `leave_out`, are passed over.
+
+    Raises:
+        InputError: the library cannot be read, or has no scene.
+    """
+    library = library.absolute()
+    if library.is_dir():
+        scenes = {str(path.relative_to(library)): path for path in _below(library, leave_out.resolve())}
+        rule = f"has no {', '.join((*READ_SUFFIXES, MITSUBA_SUFFIX))} file below it"
+    else:
+        scenes = {name: library.parent / name for name in _listed(library)}
+        rule = "names no scene"
+    if not scenes:
+        raise InputError(f"{library}: {rule}")
+    return scenes
+
+
+def _below(library: Path, leave_out: Path) -> list[Path]:
+    found: list[Path] = []
+    for folder, folders, files in os.walk(library):
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        folders[:] = [name for name in folders if Path(folder, name).resolve() != leave_out]
+        found += (Path(folder, name) for name in sorted(files) if not name.startswith("."))
+    mitsuba = [path for path in found if path.suffix.lower() == MITSUBA_SUFFIX and is_mitsuba_scene(path)]
+    parts = {part for scene in mitsuba for part in referred_files(scene)}
+    read = [path for path in found if path.suffix.lower() in READ_SUFFIXES]
+    return sorted({*mitsuba, *read} - parts)
+
+
+def _listed(library: Path) -> Iterator[str]:
+    try:
+        with library.open("rb") as file:
+            content = file.read(LONGEST_LIST_BYTES + 1)
+        text = content.decode("utf-8-sig")
+    except OSError as error:
+        raise InputError(f"{library}: cannot be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{library}: a library is a folder, or a text file with a scene a line; not UTF-8 text "
+            f"(byte {error.start})"
+        ) from error
+    if len(content) > LONGEST_LIST_BYTES:
+        raise InputError(f"{library}: a list of scenes is at most {LONGEST_LIST_BYTES} bytes long")
+    for line in text.splitlines():
+        name = line.strip()
+        if name and not name.startswith("#"):
+            yield name

@@ -1,0 +1,157 @@
+"""The scheduler of a cluster with Slurm, through submitit: an array of tasks that share out the scenes.
+
+Nothing is asked of Slurm but to run the tasks: what is done is read from the records. A task that Slurm
+preempts is queued again and goes on; scenes of a task that died go into another array.
+"""
+
+import sys
+import threading
+import time
+import uuid
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from vpltune.renderer.errors import InputError, MachineError
+from vpltune.tuner.batch.attempts import tune_with_retries
+from vpltune.tuner.batch.job import Job, read_jobs, write_jobs
+from vpltune.tuner.batch.record import Records
+from vpltune.tuner.batch.supervised_process import UNLIMITED_BYTES, Limits, SupervisedProcess
+
+try:
+    import submitit
+except ModuleNotFoundError as error:
+    raise MachineError("--slurm: submitit is not installed; try: pip install 'vpltune[cluster]'") from error
+
+POLL_SECONDS = 2.0
+ENDING_SECONDS = 10.0
+"""For tasks to end by themselves once all is done."""
+LEAST_MINUTES = 60
+MOST_MINUTES = 24 * 60
+"""Asked of Slurm for a task where `timeout_min` is not given."""
+GUESSED_MINUTES = 1.0
+"""For a scene, in that."""
+
+Event = dict[str, Any]
+
+
+class TuneShare(submitit.helpers.Checkpointable):
+    """What a task runs: its share of the scenes one after another, then what others have not begun.
+
+    Called again after it was interrupted, it passes over what is done.
+    """
+
+    def __init__(self, listing: Path, first: int, step: int, threads: int, limits: Limits) -> None:
+        self._listing = listing
+        self._first = first
+        self._step = step
+        self._threads = threads
+        self._limits = limits
+
+    def __call__(self) -> None:
+        jobs = read_jobs(self._listing)
+        process = SupervisedProcess(self._threads, threading.Event())
+        try:
+            for job in jobs[self._first :: self._step]:
+                self._tune(process, job)
+            known = Records(Path(jobs[0].folder)).known_keys()
+            # From its own place on, so that tasks that are done do not all look at the same scene; one that
+            # another task or run has is left to it.
+            for job in jobs[self._first :] + jobs[: self._first]:
+                if job.key not in known:
+                    self._tune(process, job)
+        finally:
+            process.close()
+
+    def _tune(self, process: SupervisedProcess, job: Job) -> None:
+        def say(event: Event) -> None:
+            if event["event"] == "attempt_failed":  # into the task's own log
+                print(f"{event['name']}: attempt {event['attempt']}: {event['reason']}", file=sys.stderr)
+
+        tune_with_retries(process, job, self._limits, say)
+
+
+def tune_on_slurm(
+    jobs: Sequence[Job], options: dict[str, Any], workers: int, threads: int, limits: Limits
+) -> Iterator[Event]:
+    """Tune `jobs` in arrays of at most `workers` tasks; `options` go to submitit's executor.
+
+    Left early, it cancels every task.
+
+    Raises:
+        InputError: submitit does not take the options.
+        MachineError: Slurm is not here, tasks cannot fit anything, or an array ended without a single record.
+    """
+    folder = Path(jobs[0].folder)
+    executor = _executor(folder / "slurm", options, workers, threads, limits, len(jobs))
+    left = {job.key: job for job in jobs}
+    while left:
+        before = len(left)
+        yield from _one_array(executor, Records(folder), left, workers, threads, limits)
+        if len(left) == before:
+            raise MachineError(
+                f"--slurm: every task ended without a record; see the logs in {folder / 'slurm'}"
+            )
+
+
+def _one_array(
+    executor: "submitit.AutoExecutor",
+    records: Records,
+    left: dict[str, Job],
+    workers: int,
+    threads: int,
+    limits: Limits,
+) -> Iterator[Event]:
+    # Dealt like cards, largest first: shares come out about even.
+    jobs = list(left.values())
+    count = min(workers, len(jobs))
+    listing = Path(jobs[0].folder) / "slurm" / f"jobs-{uuid.uuid4().hex[:8]}.json"
+    write_jobs(listing, jobs)
+    with executor.batch():
+        tasks = [executor.submit(TuneShare(listing, first, count, threads, limits)) for first in range(count)]
+    yield {"event": "workers", "count": len(tasks)}
+    try:
+        running = True
+        while left and running:
+            time.sleep(POLL_SECONDS)
+            # Looked at first: what a task recorded before it ended is then seen below.
+            running = not all(task.done() for task in tasks)
+            for key in records.known_keys() & left.keys():
+                record = records.read(key)
+                if record is not None:
+                    del left[key]
+                    yield {"event": "record", **asdict(record)}
+        until = time.monotonic() + ENDING_SECONDS
+        while not all(task.done() for task in tasks) and time.monotonic() < until:
+            time.sleep(0.1)
+        for task in tasks:
+            error = task.exception() if task.done() and left else None
+            if error is not None and "MachineError" in str(error):
+                raise MachineError(f"--slurm: task {task.job_id}: {str(error).strip().splitlines()[-1]}")
+    finally:
+        for task in tasks:
+            if not task.done():
+                task.cancel(check=False)
+
+
+def _executor(
+    folder: Path, options: dict[str, Any], workers: int, threads: int, limits: Limits, count: int
+) -> "submitit.AutoExecutor":
+    minutes = min(max(LEAST_MINUTES, int(GUESSED_MINUTES * count / workers)), MOST_MINUTES)
+    settings = {"name": "vpltune", "cpus_per_task": threads, "timeout_min": minutes, **options}
+    cluster = settings.pop("cluster", None)
+    if cluster in (None, "slurm"):
+        settings.setdefault("slurm_array_parallelism", workers)
+    if limits.memory_bytes < UNLIMITED_BYTES:
+        settings.setdefault("mem_gb", -(-limits.memory_bytes // 2**30))
+    try:
+        executor = submitit.AutoExecutor(folder=folder, cluster=cluster)
+        if cluster is None and executor.cluster != "slurm":
+            raise MachineError("--slurm: no Slurm is found here (srun is not on the path)")
+        executor.update_parameters(**settings)
+    except (TypeError, ValueError, NameError, RuntimeError, AssertionError) as error:
+        if isinstance(error, MachineError):
+            raise
+        raise InputError(f"--slurm: {error}") from error
+    return executor

@@ -1,0 +1,46 @@
+"""Fits as TensorBoard shows them: the loss of every step of each scene, and its errors before and after."""
+
+import contextlib
+import datetime
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from vpltune.renderer.errors import MachineError
+
+
+@contextlib.contextmanager
+def fit_curves(folder: Path, wanted: bool) -> Iterator[Callable[[dict[str, Any]], None]]:
+    """A function that takes the `record` event of each scene; it does nothing unless `wanted`.
+
+    Raises:
+        MachineError: tensorboardX is not installed.
+    """
+    if not wanted:
+        yield lambda record: None
+        return
+    try:
+        from tensorboardX import SummaryWriter
+    except ModuleNotFoundError as error:
+        raise MachineError(
+            "--tensorboard: tensorboardX is not installed; try: pip install 'vpltune[tensorboard]'"
+        ) from error
+    now = datetime.datetime.now(datetime.UTC).strftime("%Y%m%dT%H%M%S")
+    with SummaryWriter(str(folder / "tensorboard" / now)) as writer:
+        yield lambda record: _add_scene(writer, folder, record)
+
+
+def _add_scene(writer: Any, folder: Path, record: dict[str, Any]) -> None:
+    if not record["output"]:
+        return
+    metrics = json.loads((folder / record["output"] / "metrics.json").read_text(encoding="utf-8"))
+    for step, loss in enumerate(metrics["loss"].get("curve", ())):
+        if loss is not None:
+            writer.add_scalar(f"loss/{record['name']}", loss, step)
+    for split, variants in metrics["metrics"].items():
+        for step, variant in enumerate(("default", "tuned")):
+            relmse = variants.get(variant, {}).get("relmse")
+            if relmse is not None:
+                writer.add_scalar(f"relmse_{split}/{record['name']}", relmse, step)
+    writer.flush()

@@ -1,0 +1,99 @@
+"""Reference, default, tuned and ceiling side by side: whole images, indirect light, signed error."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float32, UInt8
+from PIL import Image, ImageDraw, ImageFont
+
+from vpltune.renderer.files.image_file import write_png
+from vpltune.renderer.frame.passes.tone_mapping import EXPOSURE_KEY
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.tuner.evaluation.evaluate import VARIANTS, EvaluatedView
+from vpltune.tuner.metrics.error_maps import DIVERGING, map_pixels, signed_error
+from vpltune.tuner.metrics.view_metrics import ViewMetrics
+from vpltune.tuner.surrogate.captured_view import CapturedView
+
+PANEL_WIDTH, PANEL_HEIGHT = 320, 240
+"""Pixels that a panel has at least."""
+_MARGIN = 8
+_CAPTION = 22
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
+
+Irradiance = Float32[np.ndarray, "height width 3"]
+Image8 = UInt8[np.ndarray, "height width 3"]
+Pixels = UInt8[np.ndarray, "rows columns 3"]
+
+
+def write_comparison(path: Path, runtime: Runtime, views: tuple[tuple[str, EvaluatedView], ...]) -> None:
+    """Write three rows for each view, with what it is shown for: whole images, indirect light, signed error.
+
+    Pixels are repeated, never blended, until a panel has `PANEL_WIDTH` × `PANEL_HEIGHT` of them.
+
+    Raises:
+        InputError: the path cannot be written to.
+    """
+    rows = [row for shown_for, view in views for row in _rows(runtime, view, shown_for)]
+    width = max(row.shape[1] for row in rows)
+    rows = [np.pad(row, ((0, 0), (0, width - row.shape[1]), (0, 0)), constant_values=255) for row in rows]
+    write_png(path, np.concatenate(rows))
+
+
+def picture_row(
+    runtime: Runtime, view: CapturedView, irradiance: Mapping[str, Irradiance], panel_height: int
+) -> Pixels:
+    """The reference, and beside it images of the same view with other indirect irradiance, by caption."""
+    reference = view.reference_radiance()
+    exposure = _exposure(reference, view)
+    size = (1, panel_height)
+    panels = [_panel(runtime.display(reference, exposure), f"{view.view.name}: reference", size)]
+    for caption, picture in irradiance.items():
+        panels.append(_panel(runtime.display(view.runtime_radiance(picture), exposure), caption, size))
+    return np.concatenate(panels, axis=1)
+
+
+def captioned(name: str, metrics: ViewMetrics) -> str:
+    """A panel's caption: whose image it is, and how far from the reference."""
+    if math.isnan(metrics.relmse):
+        return f"{name}: no indirect light to compare with"
+    return f"{name}: relMSE {metrics.relmse:.3g}, energy {metrics.energy_ratio:.2f}, FLIP {metrics.flip:.3f}"
+
+
+def _rows(runtime: Runtime, evaluated: EvaluatedView, shown_for: str) -> list[Pixels]:
+    view, size = evaluated.view, (PANEL_WIDTH, PANEL_HEIGHT)
+    reference = view.reference_radiance()
+    exposure = _exposure(reference, view)
+    whole = [_panel(runtime.display(reference, exposure), f"{view.view.name} ({shown_for}): reference", size)]
+    light = view.reference.irradiance * view.valid[..., None]
+    light_exposure = _exposure(light, view)
+    indirect = [_panel(runtime.display(light, light_exposure), "indirect light: reference", size)]
+    blank = np.full((*view.valid.shape, 3), 255, np.uint8)
+    errors = [_panel(blank, "signed error: blue too dark, red too bright", size)]
+    for name in VARIANTS:
+        picture = evaluated.irradiance[name]
+        shown = runtime.display(view.runtime_radiance(picture), exposure)
+        whole.append(_panel(shown, captioned(name, evaluated.metrics[name]), size))
+        shown = runtime.display(picture * view.valid[..., None], light_exposure)
+        indirect.append(_panel(shown, f"indirect light: {name}", size))
+        signed = signed_error(picture, view.reference.irradiance, view.valid)
+        colors = map_pixels(signed, -1.0, 1.0, DIVERGING, view.valid)
+        errors.append(_panel(colors, f"signed error: {name}", size))
+    return [np.concatenate(panels, axis=1) for panels in (whole, indirect, errors)]
+
+
+def _exposure(radiance: Irradiance, view: CapturedView) -> float:
+    """What brings the mean luminance to the runtime's key."""
+    level = float((radiance[view.valid] @ _LUMINANCE).mean()) if view.valid.any() else 0.0
+    return EXPOSURE_KEY / level if level > 0.0 else 1.0
+
+
+def _panel(picture: Image8, caption: str, size: tuple[int, int]) -> Pixels:
+    factor = max(-(-size[0] // picture.shape[1]), -(-size[1] // picture.shape[0]))
+    picture = picture.repeat(factor, axis=0).repeat(factor, axis=1)
+    height, width, _ = picture.shape
+    panel = Image.new("RGB", (width + 2 * _MARGIN, height + _CAPTION + _MARGIN), "white")
+    panel.paste(Image.fromarray(picture), (_MARGIN, _CAPTION))
+    ImageDraw.Draw(panel).text((_MARGIN, 3), caption, fill="black", font=ImageFont.load_default(14))
+    return np.asarray(panel)

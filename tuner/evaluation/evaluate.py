@@ -1,0 +1,194 @@
+"""Default, tuned and ceiling against the reference, on fitted and on held-out views.
+
+The ceiling is the same VPLs with ray-traced visibility towards every pixel, fitted in its turn: what is left
+of its error no choice of the falloff parameters can take away.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float32
+
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.scene.scene import Scene
+from vpltune.tuner.fitting.fit_placement import fit_placement
+from vpltune.tuner.fitting.fit_views import robust_errors
+from vpltune.tuner.metrics.view_metrics import ViewMetrics, mean_metrics
+from vpltune.tuner.reference import noise_floor, ray_traced_visibility
+from vpltune.tuner.surrogate.captured_view import PIXELS_STEP, CapturedView, runtime_irradiance
+from vpltune.tuner.surrogate.tabulated_gather import Visibility
+from vpltune.tuner.surrogate.virtual_point_lights import gather_inputs
+from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, gather
+from vpltune.tuner.surrogate.wide_vectors import wide_jit
+
+CEILING_TURNS = 2
+"""Reweightings of the ceiling's fit, which begins with the tuned parameters."""
+VARIANTS = ("default", "tuned", "ceiling")
+SPLITS = ("fitted", "held_out")
+
+_gather = wide_jit(gather)
+
+
+@dataclass(frozen=True, eq=False)
+class EvaluatedView:
+    """The three pictures of one view and how far each is from the reference."""
+
+    view: CapturedView
+    tuned: ArtistParameters
+    irradiance: dict[str, Float32[np.ndarray, "height width 3"]]
+    """By variant: `default` and `tuned` as the runtime draws them, `ceiling` from the surrogate."""
+    metrics: dict[str, ViewMetrics]
+    noise_floor: float
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """All views, and the parameters that the ceiling was fitted to."""
+
+    views: tuple[EvaluatedView, ...]
+    ceiling_parameters: ArtistParameters
+
+    def summary(self) -> dict[str, Any]:
+        """Means over the views of each split: the `metrics` that `fit` and `evaluate` report."""
+        return {split: self._split(split) for split in SPLITS}
+
+    def per_view(self) -> list[dict[str, Any]]:
+        """The same figures view by view."""
+        return [
+            {
+                "name": evaluated.view.view.name,
+                "split": evaluated.view.view.split,
+                "parameters": evaluated.tuned.as_dict(),
+                **{variant: evaluated.metrics[variant].as_dict() for variant in VARIANTS},
+                "noise_floor": evaluated.noise_floor,
+                "samples": evaluated.view.reference.samples,
+            }
+            for evaluated in self.views
+        ]
+
+    def notes(self) -> tuple[str, ...]:
+        """What the figures do not say of themselves, a sentence each."""
+        unlit = [each.view.view.name for each in self.views if not each.view.lit]
+        if not unlit:
+            return ()
+        return (f"no indirect light reaches {', '.join(unlit)}: relMSE and energy ratio have no value there",)
+
+    def most_and_least_gained(self) -> tuple[tuple[str, EvaluatedView], ...]:
+        """The views in which tuned gained most and least over default by trimmed relMSE, each with these
+        words.
+
+        One view where there is but one; the first where light reaches none.
+        """
+        measured = [
+            (each.metrics["tuned"].trimmed_relmse / each.metrics["default"].trimmed_relmse, index)
+            for index, each in enumerate(self.views)
+            if each.metrics["default"].trimmed_relmse > 0.0
+        ]
+        if not measured:
+            return (("no indirect light", self.views[0]),)
+        most, least = self.views[min(measured)[1]], self.views[max(measured)[1]]
+        return (("gained most", most),) + ((("gained least", least),) if least is not most else ())
+
+    def _split(self, split: str) -> dict[str, Any]:
+        views = [evaluated for evaluated in self.views if evaluated.view.view.split == split]
+        if not views:
+            return {}
+        means = {
+            variant: mean_metrics([evaluated.metrics[variant] for evaluated in views]).as_dict()
+            for variant in VARIANTS
+        }
+        return {**means, "noise_floor": float(np.mean([evaluated.noise_floor for evaluated in views]))}
+
+
+def evaluate(
+    scene: Scene,
+    runtime: Runtime,
+    views: tuple[CapturedView, ...],
+    default: ArtistParameters,
+    tuned: ArtistParameters | None,
+    *,
+    seed: int = 0,
+    known: Sequence[CapturedView] = (),
+    progress: Callable[[float], None] | None = None,
+) -> Evaluation:
+    """Measure every view.
+
+    Args:
+        views: captured with the VPLs of `tuned`.
+        tuned: None takes for each view what it was captured with, as a prior set it.
+        known: other captures of the same views, whose images need not be drawn again.
+        progress: called with the share done, in [0, 1].
+    """
+    visibilities = []
+    for index, view in enumerate(views):
+        visibilities.append(_visibility(scene, view))
+        if progress is not None:
+            progress(0.5 * (index + 1) / len(views))
+    fitted = [i for i, view in enumerate(views) if view.view.split == "fitted"]
+    ceiling = fit_placement(
+        [views[i] for i in fitted],
+        default if tuned is None else tuned,
+        robust_errors([views[i] for i in fitted], seed=seed),
+        seed=seed,
+        visibility=[visibilities[i] for i in fitted],
+        turns=CEILING_TURNS,
+    ).parameters
+    evaluated = []
+    for index, (view, visibility) in enumerate(zip(views, visibilities, strict=True)):
+        chosen = view.drawn_with if tuned is None else tuned
+        assert chosen is not None, "a view that a prior was captured with knows its parameters"
+        evaluated.append(_evaluate_view(runtime, view, known, default, chosen, ceiling, visibility))
+        if progress is not None:
+            progress(0.5 + 0.5 * (index + 1) / len(views))
+    return Evaluation(tuple(evaluated), ceiling)
+
+
+def _evaluate_view(
+    runtime: Runtime,
+    view: CapturedView,
+    known: Sequence[CapturedView],
+    default: ArtistParameters,
+    tuned: ArtistParameters,
+    ceiling: ArtistParameters,
+    visibility: Bool[np.ndarray, "receivers vpls"],
+) -> EvaluatedView:
+    pictures = {
+        "default": runtime_irradiance(runtime, default, view, known),
+        "tuned": runtime_irradiance(runtime, tuned, view, known),
+        "ceiling": surrogate_irradiance(view, ceiling, visibility),
+    }
+    metrics = {name: view.metrics(picture) for name, picture in pictures.items()}
+    return EvaluatedView(view, tuned, pictures, metrics, noise_floor(view.reference))
+
+
+def _visibility(scene: Scene, view: CapturedView) -> Bool[np.ndarray, "receivers vpls"]:
+    captured = view.captured
+    return ray_traced_visibility(
+        scene,
+        captured.position_world[captured.valid].astype(np.float64),
+        captured.normal_world[captured.valid],
+        captured.vpl_position_world.astype(np.float64),
+        captured.vpl_normal_world,
+    )
+
+
+def surrogate_irradiance(
+    view: CapturedView,
+    parameters: ArtistParameters,
+    visibility: Visibility | None = None,
+) -> Float32[np.ndarray, "height width 3"]:
+    """The surrogate's indirect irradiance of a whole view, zero where nothing is seen."""
+    valid = view.captured.valid
+    count = int(valid.sum())
+    # Views of one size have differing numbers of receivers; repeating some shares the compiled gather.
+    repeated = np.arange(count + -count % PIXELS_STEP) % max(count, 1)
+    receivers, vpls = gather_inputs(view.captured, repeated)
+    seen = None if visibility is None else jnp.asarray(visibility, jnp.float32)[repeated]
+    picture = np.zeros((*valid.shape, 3), np.float32)
+    gathered = _gather(receivers, vpls, FalloffParameters.of(parameters), seen)
+    picture[valid] = np.asarray(gathered)[:count]
+    return picture

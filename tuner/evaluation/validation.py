@@ -1,0 +1,109 @@
+"""Draws candidates in validation views: the evidence that `tuner.evaluation.guard` judges by."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float32
+
+from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters, placement
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.scene.views import View
+from vpltune.tuner.fitting.search_space import SearchSpace
+from vpltune.tuner.metrics.flicker import flicker, moved_by_a_texel
+from vpltune.tuner.metrics.view_metrics import ViewMetrics, mean_metrics
+from vpltune.tuner.reference.reference_view import ReferenceView
+from vpltune.tuner.surrogate.captured_view import CapturedView
+
+FITTED_SPACE = SearchSpace(tuple(spec for spec in ARTIST_PARAMETERS if spec.fitted))
+
+
+def between(first: ArtistParameters, second: ArtistParameters, share: float) -> ArtistParameters:
+    """The point at `share` of the way between two in the unit cube of the fitted parameters; the rest is
+    `second`'s."""
+    start, end = (FITTED_SPACE.point(each) for each in (first, second))
+    return FITTED_SPACE.parameters(start + share * (end - start), second)
+
+
+def candidates(
+    start: ArtistParameters,
+    base: ArtistParameters,
+    tuned: ArtistParameters,
+    auto: ArtistParameters | None,
+) -> dict[str, ArtistParameters]:
+    """What validation chooses between beside the start, the simplest first; none equals the start or another.
+
+    Args:
+        base: the tuned placement with the falloff and visibility that its fit began with.
+        auto: what the learnt prior sets; None where it does not apply.
+    """
+    named = {"placement": base, "halfway": between(base, tuned, 0.5), "tuned": tuned}
+    if base == tuned:
+        # There is nothing between them but rounding.
+        named = {"placement": base}
+    if auto is not None:
+        named["auto"] = auto
+    chosen: dict[str, ArtistParameters] = {}
+    for name, parameters in named.items():
+        if parameters != start and parameters not in chosen.values():
+            chosen[name] = parameters
+    return chosen
+
+
+def validation_metrics(
+    runtime: Runtime,
+    views: Sequence[tuple[View, ReferenceView]],
+    parameters: Mapping[str, ArtistParameters],
+    rotations: Sequence[tuple[float, float]],
+    *,
+    motion: bool = False,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[dict[str, list[ViewMetrics]], tuple[CapturedView, ...]]:
+    """Metrics of every candidate in every view that light reaches, means over the rotations.
+
+    Args:
+        runtime: of the views' scene. Its parameters are a candidate's afterwards.
+        views: with their references.
+        parameters: by name; those with one placement share VPLs and maps.
+        rotations: of the point table.
+        motion: whether to measure flicker too, which draws everything twice.
+        progress: called with the share done, in [0, 1].
+
+    Returns:
+        Metrics by name, and all views as captured with the first parameters, without maps.
+    """
+    groups: dict[tuple, list[str]] = {}
+    for name, each in parameters.items():
+        groups.setdefault(placement(each), []).append(name)
+    measured: dict[str, list[ViewMetrics]] = {name: [] for name in parameters}
+    captured_views = []
+    for index, (view, reference) in enumerate(views):
+        drawn: dict[str, list[ViewMetrics]] = {name: [] for name in parameters}
+        for names in groups.values():
+            for rotation in rotations:
+                frame, images = runtime.capture_variants(view, [parameters[name] for name in names], rotation)
+                captured = CapturedView(view, reference, frame)
+                if len(captured_views) == index:
+                    captured_views.append(captured)
+                if not captured.lit:
+                    break
+                moved: Sequence[Float32[np.ndarray, "height width 3"] | None] = [None] * len(images)
+                if motion:
+                    beside = moved_by_a_texel(view, frame.scene_length)
+                    _, moved = runtime.capture_variants(
+                        beside, [parameters[name] for name in names], rotation
+                    )
+                for name, image, after in zip(names, images, moved, strict=True):
+                    metrics = captured.metrics(image)
+                    if after is not None:
+                        metrics = replace(metrics, flicker=flicker(image, after, captured.valid))
+                    drawn[name].append(metrics)
+        if captured_views[-1].lit:
+            for name, of_rotations in drawn.items():
+                # A rotation without a value is not to vanish in a mean: it is what the guard has to see.
+                broken = [each for each in of_rotations if not math.isfinite(each.relmse)]
+                measured[name].append(broken[0] if broken else mean_metrics(of_rotations))
+        if progress is not None:
+            progress((index + 1) / len(views))
+    return measured, tuple(captured_views)

@@ -1,0 +1,1 @@
+"""Fitting: the least-squares problem, its descent, and how certain the result is."""

@@ -1,0 +1,99 @@
+"""Chooses where many VPLs stand, and what they shine as, by the images that the runtime draws.
+
+With few VPLs the best density depends on falloff and maps, and `tuner.fitting.fit_density` fits both together. With
+many, the falloff hardly moves the error of a placement, while placements differ by factors: drawn with the
+defaults of its form, each is judged by the robust error of its images. Two views screen all placements; the
+best is then drawn in all.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vpltune.renderer.config.artist_parameters import ArtistParameters, placement
+from vpltune.renderer.frame.passes.clustered_discs import LARGEST_COUNT
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.tuner.fitting.fit_density import with_cells
+from vpltune.tuner.fitting.fit_views import drawn_cost
+from vpltune.tuner.metrics.robust_error import RobustError
+from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
+
+RELAXATION = 2
+"""Lloyd iterations tried with many VPLs. A choice on development scenes:
+eight erred about as little, and took longer."""
+IMPORTANCES = (0.5, 1.0)
+"""η of the placements tried beside the start's own, at γ = 1."""
+SCREENED = 2
+"""Views that all placements are drawn in."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChosenPlacement:
+    """The placement with the least error, drawn in every view."""
+
+    parameters: ArtistParameters
+    views: tuple[CapturedView, ...]
+    costs: dict[str, float]
+    """Cost over that of the start's own placement on the screened views, by what was tried; see
+    `placement_name`."""
+
+
+def choose_placement(
+    runtime: Runtime,
+    views: Sequence[CapturedView],
+    start: ArtistParameters,
+    errors: Sequence[RobustError],
+    *,
+    seed: int = 0,
+    progress: Callable[[float], None] | None = None,
+) -> ChosenPlacement:
+    """The best of the start's own placement and clustered discs with more and more importance.
+
+    Args:
+        runtime: of the views' scene. Its parameters are a candidate's afterwards.
+        views: captured with `start`; light reaches each of them.
+        errors: how errors count in each view, from `robust_errors` with the same seed.
+        progress: called with the share done, in [0, 1].
+    """
+    tried = _placements(start)
+    screened = slice(0, SCREENED)
+    own = _costs(views[screened], errors[screened], seed)
+    drawn, costs = {}, {placement_name(start): 1.0}
+    for index, parameters in enumerate(tried):
+        runtime.parameters = parameters
+        drawn[parameters] = _captured(runtime, views[screened])
+        ratios = _costs(drawn[parameters], errors[screened], seed) / np.maximum(own, 1e-30)
+        # The geometric mean: a view in which a placement is twice as good makes up for one with half as good.
+        costs[placement_name(parameters)] = float(np.exp(np.mean(np.log(np.maximum(ratios, 1e-30)))))
+        if progress is not None:
+            progress((index + 1) / (len(tried) + 1))
+    best = min(drawn, key=lambda each: costs[placement_name(each)], default=start)
+    if best == start or costs[placement_name(best)] >= 1.0:
+        return ChosenPlacement(start, tuple(views), costs)
+    runtime.parameters = best
+    rest = _captured(runtime, views[SCREENED:])
+    return ChosenPlacement(best, (*drawn[best], *rest), costs)
+
+
+def placement_name(parameters: ArtistParameters) -> str:
+    """A placement in a few words, for metrics.json."""
+    form = f"discs λ={parameters.density_relaxation}" if parameters.density_relaxation else "points"
+    return f"{form} γ={parameters.density_exponent:g} η={parameters.density_importance:g}"
+
+
+def _placements(start: ArtistParameters) -> list[ArtistParameters]:
+    """Those other than the start's own; more VPLs than can be clustered stay points."""
+    clustered = with_cells(start, RELAXATION) if start.vpl_count <= LARGEST_COUNT else start
+    tried = [
+        replace(clustered, density_exponent=1.0, density_importance=importance) for importance in IMPORTANCES
+    ]
+    return [each for each in tried if placement(each) != placement(start)]
+
+
+def _captured(runtime: Runtime, views: Sequence[CapturedView]) -> tuple[CapturedView, ...]:
+    return capture_views(runtime, tuple(v.view for v in views), tuple(v.reference for v in views))
+
+
+def _costs(views: Sequence[CapturedView], errors: Sequence[RobustError], seed: int) -> np.ndarray:
+    return np.array([drawn_cost(view, error, seed=seed) for view, error in zip(views, errors, strict=True)])

@@ -1,0 +1,117 @@
+"""Fits intensity and falloff to views with given weights, as one small least-squares problem.
+
+The image is linear in the intensity k, so at every point of the other parameters the best k has a closed
+form, and the fit moves over the others alone (variable projection, Golub and Pereyra 1973).
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache, partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
+from vpltune.tuner.fitting.descent import STEPS, Residuals, descend
+from vpltune.tuner.fitting.fit_status import Descent, FitStatus
+from vpltune.tuner.fitting.fit_views import FitView
+from vpltune.tuner.fitting.search_space import SearchSpace
+from vpltune.tuner.surrogate.reduced_gather import ReducedGather, reduced_picture
+from vpltune.tuner.surrogate.vpl_gather import FalloffParameters
+
+Data = tuple[ReducedGather, ...]
+
+_INTENSITY = next(spec for spec in ARTIST_PARAMETERS if spec.name == "intensity")
+
+
+def fit_to(
+    views: tuple[FitView, ...],
+    start: ArtistParameters,
+    *,
+    held: frozenset[str] = frozenset(),
+    steps: int = STEPS,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[ArtistParameters, Descent]:
+    """Fit to views that are ready for it; the parameters in `held` stay at the start's, k never does.
+
+    The descent moves over all parameters but k, and is reported as if it had moved over all of them.
+    """
+    data = tuple(view.reduced for view in views)
+    if not any(jnp.any(view.factor != 0.0) for view in data):
+        point = SearchSpace().point(start)
+        return start, Descent(point, np.nan, np.nan, np.array([np.nan]), FitStatus.NOTHING_LIT)
+    offset = float(sum(view.offset for view in data)) / len(data)
+    start_loss = float(_squares(FalloffParameters.of(start), data)) + offset
+    moved = SearchSpace(
+        tuple(spec for spec in SearchSpace().specs if spec is not _INTENSITY and spec.name not in held)
+    )
+    found = descend(
+        _residuals(moved),
+        (data, FalloffParameters.of(start)),
+        moved.point(start),
+        offset=offset,
+        steps=steps,
+        progress=progress,
+    )
+    tuned = moved.parameters(found.point, start)
+    tuned = replace(tuned, intensity=float(_best_intensity(FalloffParameters.of(tuned), data)))
+    status = found.status
+    if not found.loss < start_loss:
+        status = FitStatus.NOT_FINITE if status.nothing_fitted else FitStatus.NO_IMPROVEMENT
+        tuned = start
+    elif status is FitStatus.NO_IMPROVEMENT:
+        # The closed form alone has done it.
+        status = FitStatus.CONVERGED
+    losses = np.concatenate([[start_loss], found.losses])
+    return tuned, Descent(SearchSpace().point(tuned), min(found.loss, start_loss), start_loss, losses, status)
+
+
+def _pictures_and_targets(falloff: FalloffParameters, data: Data) -> tuple[Array, Array]:
+    pictures = jnp.concatenate([reduced_picture(view, falloff) for view in data])
+    return pictures, jnp.concatenate([view.target for view in data])
+
+
+def _projected(pictures: Array, targets: Array) -> Float[Array, ""]:
+    """argmin over k in its range of |k·pictures − targets|²."""
+    product = partial(jnp.matmul, precision=jax.lax.Precision.HIGHEST)
+    # 1e-30: where no light arrives at all, any k will do.
+    best = product(pictures, targets) / jnp.maximum(product(pictures, pictures), 1e-30)
+    return jnp.clip(best, _INTENSITY.low, _INTENSITY.high)
+
+
+@jax.jit
+def _best_intensity(falloff: FalloffParameters, data: Data) -> Float[Array, ""]:
+    return _projected(*_pictures_and_targets(replace(falloff, intensity=jnp.ones(())), data))
+
+
+@jax.jit
+def _squares(falloff: FalloffParameters, data: Data) -> Float[Array, ""]:
+    pictures, targets = _pictures_and_targets(falloff, data)
+    return jnp.sum((pictures - targets) ** 2) / len(data)
+
+
+@lru_cache
+def all_residuals(space: SearchSpace) -> Residuals:
+    """Residuals over all of `space`, k like the others; what they are given is the reduced views."""
+
+    def residuals(point: Float[Array, " parameters"], data: Data) -> Float[Array, " rows"]:
+        pictures, targets = _pictures_and_targets(FalloffParameters(**space.values(point)), data)
+        return (pictures - targets) / np.sqrt(len(data))
+
+    return residuals
+
+
+@lru_cache
+def _residuals(space: SearchSpace) -> Residuals:
+    # One function object for each space: the compiled fit is found again by it.
+    def residuals(
+        point: Float[Array, " parameters"], given: tuple[Data, FalloffParameters]
+    ) -> Float[Array, " rows"]:
+        data, rest = given
+        falloff = replace(rest, intensity=jnp.ones(()), **space.values(point))
+        pictures, targets = _pictures_and_targets(falloff, data)
+        return (_projected(pictures, targets) * pictures - targets) / np.sqrt(len(data))
+
+    return residuals

@@ -1,0 +1,148 @@
+"""Fits everything that acts on VPLs where they stand: intensity, falloff, and bias and softness of the maps.
+
+The robust error (`tuner.metrics.robust_error`) is lowered by iteratively reweighted least squares: each turn
+rebuilds the small problem of `tuner.surrogate.reduced_gather` with new weights from the table, which costs
+milliseconds, and fits the falloff to it. Bias and softness are fitted after the falloff in the first turn,
+and again for as long as they move; they move only where that pays, since in most scenes the loss is all but
+flat in them.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float
+
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.tuner.fitting.fit_falloff import fit_to
+from vpltune.tuner.fitting.fit_status import Descent, FitStatus
+from vpltune.tuner.fitting.fit_views import FitView, reweighted, view_pixels
+from vpltune.tuner.fitting.fit_visibility import fit_maps
+from vpltune.tuner.fitting.search_space import SearchSpace
+from vpltune.tuner.metrics.relative_squared_error import weighted_squared_error
+from vpltune.tuner.metrics.robust_error import RobustError
+from vpltune.tuner.surrogate.captured_view import CapturedView
+from vpltune.tuner.surrogate.tabulated_gather import TabulatedGather, gather_tabulated
+from vpltune.tuner.surrogate.vpl_gather import FalloffParameters
+
+TURNS = 4
+"""Reweightings at most."""
+SETTLED = 1e-3
+"""Relative fall of the cost over a turn below which the fit counts as settled."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlacementFit:
+    """The best parameters met, with VPLs where they stand."""
+
+    parameters: ArtistParameters
+    descent: Descent
+    """Its losses are the cost at the start and after every turn."""
+    views: tuple[FitView, ...]
+    """Ready for `tuner.fitting.uncertainty`, with the best parameters' visibility and the weights of the last
+    turn."""
+
+
+def fit_placement(
+    views: Sequence[CapturedView],
+    start: ArtistParameters,
+    errors: Sequence[RobustError] | None = None,
+    *,
+    seed: int = 0,
+    held: frozenset[str] = frozenset(),
+    visibility: Sequence[Bool[np.ndarray, "pixels vpls"]] | None = None,
+    turns: int = TURNS,
+    progress: Callable[[float], None] | None = None,
+) -> PlacementFit:
+    """The parameters that bring the views closest to their references, all views counting the same.
+
+    Args:
+        views: at least one; where they have visibility maps, bias and softness are fitted too.
+        start: where to begin, and what the other parameters stay at.
+        errors: how errors count, for each view, from `robust_errors` with the same seed; None minimises
+        relMSE. seed: of the choice of pixels.
+        held: names of falloff parameters that stay at the start's.
+        visibility: for each view, of every pixel with a surface and every VPL, in place of its maps.
+        turns: reweightings at most.
+        progress: called with the share done, in [0, 1].
+    """
+    known = [None] * len(views) if visibility is None else visibility
+    pixels = [view_pixels(view, seen, seed=seed) for view, seen in zip(views, known, strict=True)]
+    current, tables = start, [each.table(start) for each in pixels]
+    ready = [each.ready(table, None) for each, table in zip(pixels, tables, strict=True)]
+    costs, found, maps_move = [_cost(ready, errors, start)], [start], True
+    for turn in range(turns):
+        if errors is not None:
+            ready = [
+                reweighted(view, error, _picture(view.table, current))
+                for view, error in zip(ready, errors, strict=True)
+            ]
+        current, descent = fit_to(tuple(ready), current, held=held)
+        if descent.status.nothing_fitted:
+            return PlacementFit(start, descent, tuple(ready))
+        if maps_move and all(each.overlap is not None for each in pixels):
+            seen = fit_maps(pixels, [view.target for view in ready], current)
+            maps_move = seen != current
+            if maps_move:
+                current = seen
+                ready = [
+                    each.ready(each.table(current), np.asarray(view.target.weight))
+                    for each, view in zip(pixels, ready, strict=True)
+                ]
+        costs.append(_cost(ready, errors, current))
+        found.append(current)
+        if progress is not None:
+            progress((turn + 1) / turns)
+        if costs[-2] - costs[-1] <= SETTLED * abs(costs[-1]):
+            break
+    # A cost that is not a number is not the least.
+    best = int(np.argmin(np.where(np.isnan(costs), np.inf, costs)))
+    if found[best] != current:
+        ready = [
+            each.ready(each.table(found[best]), np.asarray(view.target.weight))
+            for each, view in zip(pixels, ready, strict=True)
+        ]
+    status = FitStatus.CONVERGED if best > 0 else FitStatus.NO_IMPROVEMENT
+    point = SearchSpace().point(found[best])
+    descent = Descent(point, costs[best], costs[0], np.array(costs), status)
+    return PlacementFit(found[best], descent, tuple(ready))
+
+
+def ready_views(
+    views: Sequence[CapturedView],
+    parameters: ArtistParameters,
+    errors: Sequence[RobustError],
+    *,
+    seed: int = 0,
+) -> tuple[FitView, ...]:
+    """The views with the weights and the visibility that they have at `parameters`, which are not fitted."""
+    ready = []
+    for view, error in zip(views, errors, strict=True):
+        pixels = view_pixels(view, seed=seed)
+        table = pixels.table(parameters)
+        ready.append(pixels.ready(table, error.weights(_picture(table, parameters))))
+    return tuple(ready)
+
+
+_gather_tabulated = jax.jit(gather_tabulated)
+
+
+def _picture(table: TabulatedGather, parameters: ArtistParameters) -> Float[np.ndarray, "receivers 3"]:
+    return np.asarray(_gather_tabulated(table, FalloffParameters.of(parameters)))
+
+
+def _cost(
+    views: Sequence[FitView], errors: Sequence[RobustError] | None, parameters: ArtistParameters
+) -> float:
+    """The mean over views: of the robust error, or of relMSE without the reference's noise."""
+    pictures = [_picture(view.table, parameters) for view in views]
+    if errors is None:
+        targets = [view.target for view in views]
+        return float(
+            np.mean(
+                [weighted_squared_error(jnp.asarray(y), t) for y, t in zip(pictures, targets, strict=True)]
+            )
+        )
+    return float(np.mean([error.cost(y) for y, error in zip(pictures, errors, strict=True)]))

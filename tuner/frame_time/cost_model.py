@@ -1,0 +1,229 @@
+"""What a frame costs on the machine at hand, pass by pass: measured once, and kept.
+
+Every pass costs a fixed time and a time for each VPL. Which of the choices a pass depends on is known: the
+RSM's resolution moves the passes that read it, interleaving and map size those that gather. So each choice
+is measured along its own axis, at two VPL counts, and any combination is put together from these.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+
+import moderngl
+
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.files.atomic_file import write_text_whole
+from vpltune.renderer.frame.runtime import FEW_FACES, RSM_RESOLUTION, RSM_RESOLUTION_OF_MANY, Runtime
+from vpltune.renderer.frame.runtime_options import RuntimeOptions
+from vpltune.renderer.gpu.shader_library import shaders_digest
+from vpltune.renderer.scene.light_faces import face_count
+from vpltune.renderer.scene.scene import Scene
+from vpltune.renderer.scene.views import View
+from vpltune.tuner.reference.cache import cache_folder
+from vpltune.tuner.reference.content_key import scene_digest
+
+COUNTS = (32, 256)
+"""VPLs at which each choice is timed."""
+FRAMES = 5
+"""Timed at each, of which the median counts."""
+INTERLEAVES = (1, 2, 4)
+MAP_SIZES = (8, 16, 24)
+RSM_DIVISORS = (1, 2, 4)
+
+_RSM_PASSES = frozenset({"reflective_shadow_map", "vpl_importance", "virtual_point_lights"})
+_GATHER_PASSES = frozenset({"vpl_gather", "interleaved_filter"})
+_FORMAT = 3
+
+
+@dataclass(frozen=True)
+class FrameChoice:
+    """What a program chooses to fit a frame into its time, beside the number of VPLs."""
+
+    interleave: int = 1
+    visibility_map_size: int = RuntimeOptions().visibility_map_size
+    rsm_resolution: int = RSM_RESOLUTION
+    """Of a face: shadows of direct light come from the same map, and grow coarser with it."""
+
+    def runtime(self, scene: Scene, config: TunedConfig, context: moderngl.Context) -> Runtime:
+        """A runtime that draws so."""
+        options = RuntimeOptions(interleave=self.interleave, visibility_map_size=self.visibility_map_size)
+        return Runtime(scene, config, options, rsm_resolution=self.rsm_resolution, context=context)
+
+
+@dataclass(frozen=True)
+class PassCost:
+    """Milliseconds of a pass: `fixed` + `per_vpl` · N."""
+
+    fixed: float
+    per_vpl: float
+
+
+Costs = dict[str, PassCost]
+
+
+@dataclass(frozen=True)
+class CostModel:
+    """Pass costs along each axis, the other choices being the first of theirs."""
+
+    interleave: dict[int, Costs]
+    visibility_map_size: dict[int, Costs]
+    rsm_resolution: dict[int, Costs]
+
+    def costs(self, choice: FrameChoice) -> Costs:
+        """Every pass of a frame so drawn."""
+        gathered = self.interleave[choice.interleave]
+        mapped = self.visibility_map_size.get(choice.visibility_map_size, {})
+        shadowed = self.rsm_resolution[choice.rsm_resolution]
+        combined = {}
+        for name, cost in gathered.items():
+            if name in _RSM_PASSES:
+                cost = shadowed[name]
+            elif name == "vpl_visibility_maps":
+                cost = mapped[name]
+            elif name in _GATHER_PASSES and mapped:
+                cost = _scaled(cost, mapped["vpl_gather"], self._base(name="vpl_gather"))
+            combined[name] = cost
+        return combined
+
+    def scaled(self, factor: float) -> "CostModel":
+        """Of a machine on which everything takes `factor` times as long."""
+        axes = {axis.name: getattr(self, axis.name) for axis in fields(self)}
+        return CostModel(
+            **{
+                name: {value: _times(costs, factor) for value, costs in axis.items()}
+                for name, axis in axes.items()
+            }
+        )
+
+    def milliseconds(self, choice: FrameChoice, count: int) -> float:
+        """Of a whole frame with `count` VPLs."""
+        return sum(cost.fixed + cost.per_vpl * count for cost in self.costs(choice).values())
+
+    def count_within(self, choice: FrameChoice, milliseconds: float) -> float:
+        """How many VPLs a frame can have in that time; below 1, none."""
+        costs = self.costs(choice).values()
+        return (milliseconds - sum(cost.fixed for cost in costs)) / self.per_vpl(choice)
+
+    def per_vpl(self, choice: FrameChoice) -> float:
+        """Milliseconds for each VPL more."""
+        # 1e-6: no timer sees less, and noise may make a slope vanish.
+        return max(sum(cost.per_vpl for cost in self.costs(choice).values()), 1e-6)
+
+    def _base(self, name: str) -> PassCost:
+        return self.interleave[INTERLEAVES[0]][name]
+
+
+def measured_cost_model(
+    scene: Scene,
+    views: Sequence[View],
+    config: TunedConfig,
+    context: moderngl.Context,
+    progress: Callable[[float], None] | None = None,
+) -> CostModel:
+    """The cost of a frame that shows the slowest of `views`, from the cache or measured now.
+
+    `config` says how VPLs are occluded, and whether there is importance and a near field to pay for.
+    """
+    key = costs_key(str(context.info["GL_RENDERER"]), scene, views, config)
+    path = cache_folder() / "costs" / f"{key}.json"
+    kept = _read(path)
+    if kept is not None:
+        return kept
+    base = default_choice(views[0])
+    axes: dict[str, dict[int, Costs]] = {}
+    values = {
+        "interleave": INTERLEAVES,
+        "visibility_map_size": MAP_SIZES if config.visibility == "maps" else (),
+        "rsm_resolution": rsm_resolutions(views[0]),
+    }
+    total = sum(len(axis) for axis in values.values())
+    done, measured = 0, {}
+    for name, axis in values.items():
+        axes[name] = {}
+        for value in axis:
+            choice = replace(base, **{name: value})
+            if choice not in measured:
+                measured[choice] = _measure(choice.runtime(scene, config, context), views, config)
+            axes[name][value] = measured[choice]
+            done += 1
+            if progress is not None:
+                progress(done / total)
+    model = CostModel(**axes)
+    _write(path, model)
+    return model
+
+
+def costs_key(renderer: str, scene: Scene, views: Sequence[View], config: TunedConfig) -> str:
+    """Hash of all that a frame's costs depend on."""
+    parts = [_FORMAT, renderer, shaders_digest(), scene_digest(scene), config.visibility]
+    parts += [config.parameters.density_importance > 0.0, config.parameters.screen_space_strength > 0.0]
+    parts += [config.parameters.density_relaxation]
+    for view in views:
+        parts += [view.size, view.camera.to_world.tolist(), view.camera.yfov]
+        parts += [
+            (light.kind, light.position_world.tolist(), light.direction_world.tolist(), light.outer_cone)
+            for light in view.lights
+        ]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def default_choice(view: View) -> FrameChoice:
+    """What a runtime does unless told otherwise."""
+    return FrameChoice(rsm_resolution=rsm_resolutions(view)[0])
+
+
+def rsm_resolutions(view: View) -> tuple[int, ...]:
+    """Of a face, the runtime's own first."""
+    own = RSM_RESOLUTION if face_count(view.lights) <= FEW_FACES else RSM_RESOLUTION_OF_MANY
+    return tuple(own // divisor for divisor in RSM_DIVISORS)
+
+
+def _times(costs: Costs, factor: float) -> Costs:
+    return {name: PassCost(factor * cost.fixed, factor * cost.per_vpl) for name, cost in costs.items()}
+
+
+def _scaled(cost: PassCost, other: PassCost, base: PassCost) -> PassCost:
+    ratio = other.per_vpl / base.per_vpl if base.per_vpl > 0.0 else 1.0
+    return PassCost(cost.fixed, cost.per_vpl * ratio)
+
+
+def _measure(runtime: Runtime, views: Sequence[View], config: TunedConfig) -> Costs:
+    """The slowest view's passes at both counts, as lines through them."""
+    at_count = []
+    for count in COUNTS:
+        runtime.parameters = replace(config.parameters, vpl_count=count)
+        by_view = [runtime.pass_milliseconds(view, FRAMES) for view in views]
+        at_count.append(max(by_view, key=lambda passes: sum(passes.values())))
+    low, high = at_count
+    costs = {}
+    for name in high:
+        slope = max(0.0, (high[name] - low.get(name, 0.0)) / (COUNTS[1] - COUNTS[0]))
+        # Noise may make a pass dearer with fewer VPLs: then all of it is fixed.
+        costs[name] = PassCost(max(0.0, high[name] - slope * COUNTS[1]), slope)
+    return costs
+
+
+def _write(path: Path, model: CostModel) -> None:
+    try:
+        write_text_whole(path, json.dumps(asdict(model), indent=1) + "\n")
+    except InputError:
+        return  # a folder that cannot be written to: measured anew next time
+
+
+def _read(path: Path) -> CostModel | None:
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+        return CostModel(
+            **{
+                name: {
+                    int(value): {key: PassCost(**cost) for key, cost in costs.items()}
+                    for value, costs in axis.items()
+                }
+                for name, axis in document.items()
+            }
+        )
+    except (OSError, ValueError, TypeError, AttributeError):
+        return None

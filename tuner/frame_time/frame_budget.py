@@ -1,0 +1,301 @@
+"""The best picture within a frame's time: from the cost model, then settled and verified in the runtime."""
+
+import hashlib
+import importlib.metadata
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.tuner.evaluation.prepare_scene import PreparedScene
+from vpltune.tuner.fitting.fit_density import (
+    FEW_VPLS,
+    HELD_OUT_ROTATIONS,
+    ROTATIONS,
+    DensityFit,
+    fit_density,
+    rotated_views,
+    rotation_errors,
+    table_rotations,
+    with_cells,
+)
+from vpltune.tuner.fitting.fit_placement import fit_placement
+from vpltune.tuner.fitting.fit_status import Descent
+from vpltune.tuner.fitting.fit_views import robust_errors
+from vpltune.tuner.fitting.search_space import held_for
+from vpltune.tuner.frame_time.cost_model import (
+    COUNTS,
+    INTERLEAVES,
+    MAP_SIZES,
+    CostModel,
+    FrameChoice,
+    costs_key,
+    default_choice,
+    measured_cost_model,
+    rsm_resolutions,
+)
+
+AIM = 0.97
+"""Of the budget: what a frame is settled at, so that noise does not carry it over."""
+LEAST, MOST = 0.93, 1.0
+"""Of the budget, between which a settled frame is left as it is."""
+OVER = 1.05
+"""Of the budget, above which no frame may stay."""
+TRIES = 10
+FRAMES, MOST_FRAMES = 3, 100
+"""Timed each time, of which the median counts: as many as fill `TIMED` in this range."""
+TIMED = 500.0
+"""Milliseconds: a machine that does other things beside is seldom as busy for less."""
+LEVEL_FRAMES = 15
+"""Timed at each of two counts, to tell how fast the machine is beside its cost model."""
+SHADOW_SHARE = 0.25
+"""Of the budget, which RSM and placement may take at most before the RSM is made coarser. With a half, more
+time went to a finer RSM alone, and the indirect light was worse than with less."""
+LEAST_COUNT = 4
+"""VPLs for each pixel of a block, below which a budget is called too small."""
+CHOICE_ROTATIONS = 3
+GUESSED_IMPORTANCE = 0.75
+"""η while the count is not yet known: what it costs does not depend on its value."""
+_CHOSEN, _FITTED = 0.25, 0.9
+"""Of a fit's work: done once the choice is made, and once density and falloff are fitted."""
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class SettledFrame:
+    """A VPL count whose measured frame fits the budget."""
+
+    choice: FrameChoice
+    vpl_count: int
+    milliseconds: float
+    tries: int
+
+
+@dataclass(frozen=True, eq=False)
+class BudgetFit:
+    """What was chosen for a budget, and how it measured."""
+
+    budget: float
+    frame: SettledFrame
+    predicted: float
+    parameters: ArtistParameters
+    descent: Descent
+    relmse: float
+    """In the runtime with all choices, over fitted views and held-out rotations."""
+    runtime: Runtime
+
+    def document(self) -> dict[str, Any]:
+        """What metrics.json says of it."""
+        return {
+            "budget_milliseconds": self.budget,
+            "milliseconds": self.frame.milliseconds,
+            "predicted_milliseconds": self.predicted,
+            "relmse": self.relmse,
+            "vpl_count": self.frame.vpl_count,
+            "choice": asdict(self.frame.choice),
+            "tries": self.frame.tries,
+        }
+
+
+class FrameBudget:
+    """Fits a prepared scene, some view of which is lit, to budgets of frames of one size.
+
+    The slowest of the fitted views counts. Raises MachineError as `Runtime`.
+    """
+
+    def __init__(
+        self,
+        prepared: PreparedScene,
+        start: TunedConfig,
+        frame_size: tuple[int, int],
+        *,
+        seed: int = 0,
+        progress: Progress | None = None,
+    ):
+        self._prepared = prepared
+        self._seed = seed
+        fitted = [view for view in prepared.views if view.view.split == "fitted"]
+        # A view that no light reaches says nothing of errors, and takes its time all the same.
+        self._views = tuple(view for view in fitted if view.lit)
+        self._timed = tuple(replace(view.view, size=frame_size) for view in fitted)
+        guessed = replace(with_cells(start.parameters), density_importance=GUESSED_IMPORTANCE)
+        self._start = replace(start, parameters=guessed)
+        self._runtimes: dict[FrameChoice, Runtime] = {}
+        self.default_choice = default_choice(self._timed[0])
+        measured = measured_cost_model(
+            prepared.scene, self._timed, self._start, prepared.runtime.context, progress
+        )
+        self.costs: CostModel = measured.scaled(self._level(measured))
+
+    def least_milliseconds(self) -> float:
+        """The least budget: of the cheapest frame in which every pixel has any VPLs to speak of."""
+        return min(
+            self.costs.milliseconds(choice, LEAST_COUNT * choice.interleave**2) / AIM
+            for choice in self._choices(0.0)
+        )
+
+    def fit(self, budget: float, progress: Progress | None = None) -> BudgetFit:
+        """The best found within `budget` milliseconds.
+
+        Raises:
+            InputError: no frame is as fast as that, or none was when it was measured.
+        """
+        report = progress or (lambda share: None)
+        choice = self._best_choice(budget, lambda share: report(_CHOSEN * share))
+        frame = self._settle(choice, budget)
+        start = replace(self._start.parameters, vpl_count=frame.vpl_count)
+        fit = self._fitted(start, lambda share: report(_CHOSEN + (_FITTED - _CHOSEN) * share))
+        # Without importance a frame is cheaper, and the falloff does not change what it costs.
+        settled = self._settle(choice, budget, fit.parameters)
+        parameters = replace(fit.parameters, vpl_count=settled.vpl_count)
+        if abs(settled.vpl_count - frame.vpl_count) > 0.1 * frame.vpl_count:
+            parameters = self._falloff_at(parameters)
+        runtime = self.runtime(settled.choice)
+        rotations = table_rotations(HELD_OUT_ROTATIONS, self._seed, held_out=True)
+        errors = rotation_errors(runtime, self._views, parameters, rotations)
+        predicted = self.costs.milliseconds(settled.choice, settled.vpl_count)
+        report(1.0)
+        return BudgetFit(budget, settled, predicted, parameters, fit.descent, float(errors.mean()), runtime)
+
+    def content_key(self) -> str:
+        """Of all that fits depend on, but for how fast the machine is at the moment."""
+        renderer = self._prepared.runtime.opengl_renderer
+        parts = [
+            costs_key(renderer, self._prepared.scene, self._timed, self._start),
+            importlib.metadata.version("vpltune"),
+            self._start.parameters.as_dict(),
+            self._seed,
+        ]
+        digest = hashlib.sha256(json.dumps(parts).encode())
+        for view in self._views:
+            for half in (view.reference.irradiance_a, view.reference.irradiance_b):
+                digest.update(f"{half.shape};".encode())
+                digest.update(np.ascontiguousarray(half).tobytes())
+        return digest.hexdigest()
+
+    def milliseconds(self, runtime: Runtime, parameters: ArtistParameters, frames: int = FRAMES) -> float:
+        """Of the slowest view's frame, as it measures now."""
+        runtime.parameters = parameters
+        return max(runtime.frame_milliseconds(view, frames) for view in self._timed)
+
+    def _level(self, costs: CostModel) -> float:
+        """How much longer frames take than the model says: passes overlap in them, and a model is kept longer
+        than a machine is as busy as it was."""
+        choice = self.default_choice
+        runtime = self.runtime(choice)
+        measured = sum(
+            self.milliseconds(runtime, replace(self._start.parameters, vpl_count=count), LEVEL_FRAMES)
+            for count in COUNTS
+        )
+        return measured / sum(costs.milliseconds(choice, count) for count in COUNTS)
+
+    def _choices(self, budget: float) -> list[FrameChoice]:
+        """All ways to gather, with the finest RSM that leaves enough of the budget."""
+        maps = MAP_SIZES if self._start.visibility == "maps" else (FrameChoice.visibility_map_size,)
+        resolutions = rsm_resolutions(self._timed[0])
+        resolution = next(
+            (each for each in resolutions if self._rsm_milliseconds(each) <= SHADOW_SHARE * budget),
+            resolutions[-1],
+        )
+        return [FrameChoice(interleave, size, resolution) for interleave in INTERLEAVES for size in maps]
+
+    def _rsm_milliseconds(self, resolution: int) -> float:
+        names = ("reflective_shadow_map", "vpl_importance", "virtual_point_lights")
+        costs = self.costs.rsm_resolution[resolution]
+        return sum(costs[name].fixed for name in names if name in costs)
+
+    def _best_choice(self, budget: float, progress: Progress) -> FrameChoice:
+        """Least error of the start's own parameters, each choice with the VPLs that it can pay for."""
+        rotations = table_rotations(CHOICE_ROTATIONS, self._seed)
+        errors = {}
+        choices = self._choices(budget)
+        for index, choice in enumerate(choices):
+            progress(index / len(choices))
+            count = min(self.costs.count_within(choice, AIM * budget), parameter_spec("vpl_count").high)
+            if count < LEAST_COUNT * choice.interleave**2:
+                continue  # every pixel of a block needs VPLs of its own
+            parameters = replace(self._start.parameters, vpl_count=int(count))
+            errors[choice] = rotation_errors(self.runtime(choice), self._views, parameters, rotations).mean()
+        if not errors:
+            raise InputError(
+                f"--budget-ms: must be at least {self.least_milliseconds():.3g} on this machine for "
+                f"frames of {self._timed[0].size[0]}x{self._timed[0].size[1]}, got {budget:g}"
+            )
+        return min(errors, key=lambda choice: errors[choice])
+
+    def _settle(
+        self, choice: FrameChoice, budget: float, parameters: ArtistParameters | None = None
+    ) -> SettledFrame:
+        """Change the count until the measured frame fits: the slope is the model's, its level measured.
+
+        With the parameters that it will have, it must fit twice: of many tries one would pass by luck.
+        """
+        runtime = self.runtime(choice)
+        chosen = self._start.parameters if parameters is None else parameters
+        least, most = LEAST_COUNT * choice.interleave**2, int(parameter_spec("vpl_count").high)
+        expected = self.costs.count_within(choice, AIM * budget)
+        wanted = expected if parameters is None else parameters.vpl_count
+        slope, measured = self.costs.per_vpl(choice), {}
+        final = parameters is not None
+        frames = int(np.clip(TIMED / budget, FRAMES, MOST_FRAMES)) if final else FRAMES
+        for attempt in range(TRIES):
+            count = int(np.clip(round(wanted), least, most))
+            taken = self.milliseconds(runtime, replace(chosen, vpl_count=count), frames)
+            confirmed = count in measured
+            # A count that is asked for again has been timed on a quieter or busier machine: both count.
+            measured[count] = 0.5 * (taken + measured[count]) if confirmed else taken
+            if not LEAST * budget <= measured[count] <= MOST * budget:
+                slope = _slope(measured, slope)
+                wanted = max(count + (AIM * budget - measured[count]) / slope, 0.25 * count)
+            elif confirmed or not final:
+                return SettledFrame(choice, count, measured[count], attempt + 1)
+        fitting = {count: taken for count, taken in measured.items() if taken <= OVER * budget}
+        if not fitting:
+            raise InputError(
+                f"--budget-ms: no frame could be measured within {budget:g} ms; "
+                f"the fastest took {min(measured.values()):.3g}"
+            )
+        best = max(fitting, key=lambda count: fitting[count])
+        return SettledFrame(choice, best, fitting[best], TRIES)
+
+    def _fitted(self, start: ArtistParameters, progress: Progress | None) -> DensityFit:
+        # The more VPLs, the less does one placement differ from another: the work is that of few.
+        rotations = int(np.clip(ROTATIONS * FEW_VPLS // start.vpl_count, 2, ROTATIONS))
+        return fit_density(
+            self._prepared.runtime,
+            self._views,
+            start,
+            seed=self._seed,
+            rotations=table_rotations(rotations, self._seed),
+            progress=progress,
+        )
+
+    def _falloff_at(self, parameters: ArtistParameters) -> ArtistParameters:
+        rotations = table_rotations(HELD_OUT_ROTATIONS, self._seed)
+        captured = rotated_views(self._prepared.runtime, self._views, parameters, rotations)
+        errors = robust_errors(captured, seed=self._seed)
+        held = held_for(self._start.visibility)
+        return fit_placement(captured, parameters, errors, seed=self._seed, held=held).parameters
+
+    def runtime(self, choice: FrameChoice) -> Runtime:
+        """What draws so; the same one each time."""
+        if choice not in self._runtimes:
+            self._runtimes[choice] = choice.runtime(
+                self._prepared.scene, self._start, self._prepared.runtime.context
+            )
+        return self._runtimes[choice]
+
+
+def _slope(measured: dict[int, float], model: float) -> float:
+    """Milliseconds for each VPL: between the extreme counts that were measured, held near the model's."""
+    low, high = min(measured), max(measured)
+    if high < 1.2 * low:
+        return model
+    return float(np.clip((measured[high] - measured[low]) / (high - low), 0.3 * model, 3.0 * model))

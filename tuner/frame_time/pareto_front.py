@@ -1,0 +1,156 @@
+"""The front of error against a frame's time: fits over the range of useful budgets, timed in turns.
+
+A point costs a whole fit, so each is kept in the user's cache as it is made: a front that was interrupted
+goes on with the budgets that it began with. One that is done is forgotten there: who asks again wants it
+measured anew.
+"""
+
+import json
+import statistics
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.files.atomic_file import write_text_whole
+from vpltune.tuner.fitting.fit_status import Descent, FitStatus
+from vpltune.tuner.frame_time.cost_model import FrameChoice
+from vpltune.tuner.frame_time.frame_budget import BudgetFit, FrameBudget, Progress, SettledFrame
+from vpltune.tuner.reference.cache import cache_folder
+
+POINTS = 6
+DENSEST = 512
+"""VPLs of the default frame, whose time the front goes up to: more of them hardly change the error."""
+TURNS, FRAMES_A_TURN = 3, 3
+"""Points are timed in turns, so that a machine that is busier for a while is so for all of them."""
+
+
+def fit_front(budget: FrameBudget, progress: Progress | None = None) -> tuple[BudgetFit, ...]:
+    """Fits whose error falls as their time rises: what another beats in both is left out.
+
+    Raises:
+        InputError: not one budget could be met when it was measured.
+    """
+    kept = _KeptFits(budget)
+    points: list[BudgetFit] = []
+    for index, milliseconds in enumerate(kept.budgets):
+
+        def report(share: float, done: int = index) -> None:
+            if progress is not None:
+                progress((done + share) / len(kept.budgets))
+
+        report(0.0)
+        if index < len(kept.fits):
+            points += kept.fits[index]
+            continue
+        try:
+            kept.add((budget.fit(milliseconds, report),))
+        except InputError:
+            # The cheapest frame did not measure as predicted: the front starts later.
+            if not points and milliseconds == kept.budgets[-1]:
+                raise
+            kept.add(())
+        points += kept.fits[index]
+    timed = _timed_in_turns(budget, points)
+    kept.forget()
+    return pareto_front(timed)
+
+
+def pareto_front(points: Sequence[BudgetFit]) -> tuple[BudgetFit, ...]:
+    """Those that no other beats in both time and error, by rising time."""
+    front: list[BudgetFit] = []
+    for point in sorted(points, key=lambda point: (point.frame.milliseconds, point.relmse)):
+        if not front or point.relmse < front[-1].relmse:
+            front.append(point)
+    return tuple(front)
+
+
+def _timed_in_turns(budget: FrameBudget, points: Sequence[BudgetFit]) -> list[BudgetFit]:
+    """The same with the times that they have beside each other."""
+    taken: list[list[float]] = [[] for _ in points]
+    for _ in range(TURNS):
+        for times, point in zip(taken, points, strict=True):
+            times.append(budget.milliseconds(point.runtime, point.parameters, FRAMES_A_TURN))
+    return [
+        replace(point, frame=replace(point.frame, milliseconds=statistics.median(times)))
+        for times, point in zip(taken, points, strict=True)
+    ]
+
+
+def _budgets(budget: FrameBudget) -> list[float]:
+    least = 1.1 * budget.least_milliseconds()
+    most = max(4.0 * least, budget.costs.milliseconds(budget.default_choice, DENSEST))
+    return [float(each) for each in np.geomspace(least, most, POINTS)]
+
+
+class _KeptFits:
+    """What of a front is done: its budgets, and for the first of them a fit, or none where it was not met."""
+
+    def __init__(self, budget: FrameBudget):
+        self._path: Path = cache_folder() / "fronts" / f"{budget.content_key()}.json"
+        self.fits: list[tuple[BudgetFit, ...]]
+        try:
+            document = json.loads(self._path.read_text(encoding="utf-8"))
+            self.budgets = [float(each) for each in document["budgets"]]
+            self.fits = [tuple(_read_fit(each, budget) for each in fits) for fits in document["fits"]]
+        except (OSError, ValueError, TypeError, KeyError, AttributeError):
+            # None was interrupted, or its file is damaged.
+            self.budgets, self.fits = _budgets(budget), []
+
+    def add(self, fits: tuple[BudgetFit, ...]) -> None:
+        """The next budget's."""
+        self.fits.append(fits)
+        document = {
+            "budgets": self.budgets,
+            "fits": [[_fit_document(fit) for fit in each] for each in self.fits],
+        }
+        try:
+            write_text_whole(self._path, json.dumps(document) + "\n")
+        except InputError:
+            return  # a folder that cannot be written to: an interrupted front begins anew
+
+    def forget(self) -> None:
+        """The front is done."""
+        self._path.unlink(missing_ok=True)
+
+
+def _fit_document(fit: BudgetFit) -> dict[str, Any]:
+    descent = fit.descent
+    return {
+        "budget": fit.budget,
+        "frame": asdict(fit.frame),
+        "predicted": fit.predicted,
+        "parameters": fit.parameters.as_dict(),
+        "descent": {
+            "point": descent.point.tolist(),
+            "loss": descent.loss,
+            "start_loss": descent.start_loss,
+            "losses": descent.losses.tolist(),
+            "status": descent.status.name,
+        },
+        "relmse": fit.relmse,
+    }
+
+
+def _read_fit(document: dict[str, Any], budget: FrameBudget) -> BudgetFit:
+    descent = document["descent"]
+    choice = FrameChoice(**document["frame"]["choice"])
+    return BudgetFit(
+        document["budget"],
+        SettledFrame(**{**document["frame"], "choice": choice}),
+        document["predicted"],
+        ArtistParameters(**document["parameters"]),
+        Descent(
+            np.array(descent["point"], np.float32),
+            descent["loss"],
+            descent["start_loss"],
+            np.array(descent["losses"], np.float64),
+            FitStatus[descent["status"]],
+        ),
+        document["relmse"],
+        budget.runtime(choice),
+    )

@@ -1,0 +1,1 @@
+"""The learnt prior: its scenes, its training, its card."""

@@ -1,0 +1,159 @@
+"""A captured view's loss as a table over all that a prior sets: a training step then costs a look-up.
+
+With y the picture at intensity 1, the loss Σ w (ky − a)(ky − b) is A k² − B k + C with A = Σ w y²,
+B = Σ w y (a + b) and C = Σ w a b, so only A and B depend on the other parameters, and they are smooth in
+them. They are tabulated over α, β and σ through the surrogate (`tuner.surrogate.vpl_gather`, `tuner.surrogate.vpl_visibility`)
+and interpolated: cubic in α, linear in β and σ.
+"""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Float32
+
+from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
+from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS, place_of, value_at
+from vpltune.tuner.metrics.relative_squared_error import Target, target_of
+from vpltune.tuner.metrics.robust_error import robust_error
+from vpltune.tuner.surrogate.captured_view import CapturedView
+from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights, gather_inputs
+from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, gather
+from vpltune.tuner.surrogate.vpl_visibility import (
+    VisibilityParameters,
+    map_texels,
+    seen_share,
+    surface_overlap,
+)
+from vpltune.tuner.surrogate.wide_vectors import wide_jit
+
+RECEIVERS = 2048
+"""Pixels of a view that a table looks at."""
+
+FOOTPRINT_PLACES = tuple(np.linspace(0.15, 0.75, 11).tolist())
+BIAS_PLACES = (0.0, 0.25, 0.5, 0.75, 1.0)
+SOFTNESS_PLACES = tuple(np.linspace(0.0, 1.0, 7).tolist())
+"""Nodes along the parameters' axes: α from 0.12 to 4.5; β and σ over all of theirs."""
+
+_PLACES = (FOOTPRINT_PLACES, BIAS_PLACES, SOFTNESS_PLACES)
+_INTENSITY_SPEC = parameter_spec("intensity")
+LOWEST_POINT, HIGHEST_POINT = (
+    np.array([place_of(_INTENSITY_SPEC, intensity), *(places[end] for places in _PLACES)], np.float32)
+    for intensity, end in ((0.5, 0), (2.0, -1))
+)
+"""The part of the unit cube that tables cover, with intensities from 1/2 to 2."""
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class LossTable:
+    """Of one view, or stacked of many."""
+
+    square: Float[Array | np.ndarray, "*views footprints biases softnesses"]
+    """A."""
+    product: Float[Array | np.ndarray, "*views footprints biases softnesses"]
+    """B."""
+    constant: Float[Array | np.ndarray, "*views"]
+    """C."""
+
+
+def loss_table(
+    view: CapturedView, parameters: ArtistParameters, seed: int, *, robust: bool = True
+) -> LossTable:
+    """The table of one view, from the buffers and the visibility maps that it was captured with.
+
+    With `robust`, pixels weigh as in the first step of a robust fit that begins with the captured image;
+    else as in relMSE. A view in which no light arrives has a table of zeros.
+    """
+    pixels = view.fitted_pixels(RECEIVERS, seed)
+    receivers, vpls = gather_inputs(view.captured, pixels)
+    flat = np.flatnonzero(view.captured.valid.ravel())[pixels]
+    reference, drawn = view.reference, view.captured.indirect_irradiance.reshape(-1, 3)[flat]
+    halves = [half.reshape(-1, 3)[flat] for half in (reference.irradiance_a, reference.irradiance_b)]
+    weight = None
+    if robust:
+        direct = reference.direct_irradiance.reshape(-1, 3)[flat]
+        weight = robust_error((halves[0] + halves[1]) / 2.0, direct, drawn).weights(drawn)
+    target = target_of(*halves, weight)
+    maps = view.captured.visibility_maps
+    overlap = None if maps is None else surface_overlap(receivers, vpls, map_texels(maps))
+    square, product = _sums(receivers, vpls, overlap, jnp.float32(parameters.falloff_transmittance), target)
+    constant = np.sum(np.asarray(target.weight * target.half_a * target.half_b, np.float64))
+    return LossTable(np.asarray(square), np.asarray(product), np.array(constant, np.float32))
+
+
+@wide_jit
+def _sums(
+    receivers: Receivers,
+    vpls: VirtualPointLights,
+    overlap: Array | None,
+    transmittance: Array,
+    target: Target,
+) -> tuple[Array, Array]:
+    """A and B at every node."""
+    footprints, biases, softnesses = (
+        jnp.array([value_at(parameter_spec(name), place) for place in places], jnp.float32)
+        for name, places in zip(AUTO_PARAMETERS[1:], _PLACES, strict=True)
+    )
+
+    def at(footprint: Array, seen: Array | None) -> tuple[Array, Array]:
+        picture = gather(receivers, vpls, FalloffParameters(jnp.ones(()), footprint, transmittance), seen)
+        weighed = target.weight * picture
+        return jnp.sum(weighed * picture), jnp.sum(weighed * (target.half_a + target.half_b))
+
+    def at_all_footprints(node: tuple[Array, Array]) -> tuple[Array, Array]:
+        seen = None if overlap is None else seen_share(overlap, VisibilityParameters(*node))
+        return jax.vmap(at, in_axes=(0, None))(footprints, seen)
+
+    grid = jnp.meshgrid(biases, softnesses, indexing="ij")
+    sums = jax.lax.map(at_all_footprints, tuple(values.ravel() for values in grid))
+    return tuple(values.T.reshape(*map(len, _PLACES)) for values in sums)
+
+
+def table_loss(table: LossTable, point: Float[Array | np.ndarray, " parameters"]) -> Float[Array, ""]:
+    """The loss of one view at a point between `LOWEST_POINT` and `HIGHEST_POINT`; differentiable."""
+    point = jnp.asarray(point)
+    starts, weights = zip(
+        _cubic(point[1], FOOTPRINT_PLACES),
+        _linear(point[2], BIAS_PLACES),
+        _linear(point[3], SOFTNESS_PLACES),
+        strict=True,
+    )
+
+    def interpolated(values: Array) -> Array:
+        near = jax.lax.dynamic_slice(values, starts, (4, 2, 2))
+        return jnp.einsum("abc,a,b,c->", near, *weights, precision=jax.lax.Precision.HIGHEST)
+
+    intensity = _INTENSITY_SPEC.low * jnp.exp(point[0] * np.log(_INTENSITY_SPEC.high / _INTENSITY_SPEC.low))
+    return (
+        intensity**2 * interpolated(table.square) - intensity * interpolated(table.product) + table.constant
+    )
+
+
+def default_point(parameters: ArtistParameters) -> Float32[np.ndarray, " parameters"]:
+    """Where `parameters` lie in the unit cube of `AUTO_PARAMETERS`."""
+    given = parameters.as_dict()
+    return np.array([place_of(parameter_spec(name), given[name]) for name in AUTO_PARAMETERS], np.float32)
+
+
+def _cubic(place: Array, nodes: tuple[float, ...]) -> tuple[Array, Float[Array, "4"]]:
+    """First node and weights of cubic Lagrange interpolation on even nodes; one-sided at both ends."""
+    scaled = (place - nodes[0]) / (nodes[1] - nodes[0])
+    first = jnp.clip(jnp.floor(scaled) - 1.0, 0.0, len(nodes) - 4.0).astype(jnp.int32)
+    x = scaled - first
+    weights = [
+        -(x - 1.0) * (x - 2.0) * (x - 3.0) / 6.0,
+        x * (x - 2.0) * (x - 3.0) / 2.0,
+        -x * (x - 1.0) * (x - 3.0) / 2.0,
+        x * (x - 1.0) * (x - 2.0) / 6.0,
+    ]
+    return first, jnp.stack(weights)
+
+
+def _linear(place: Array, nodes: tuple[float, ...]) -> tuple[Array, Float[Array, "2"]]:
+    """First node and weights of linear interpolation between uneven nodes; constant beyond them."""
+    at = jnp.array(nodes, jnp.float32)
+    first = jnp.clip(jnp.searchsorted(at, place, side="right") - 1, 0, len(nodes) - 2).astype(jnp.int32)
+    share = jnp.clip((place - at[first]) / (at[first + 1] - at[first]), 0.0, 1.0)
+    return first, jnp.stack([1.0 - share, share])

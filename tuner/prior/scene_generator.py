@@ -1,0 +1,319 @@
+"""Varied small scenes, by number: rooms, halls, corridors and courtyards with furniture, colours and lights.
+
+What a prior is trained on. Each has a camera and lights of its own and a scale between a hundredth and a
+hundred: nothing that is learnt may know a unit. The same seed gives the same scene, bit for bit.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from jaxtyping import Float64
+
+from vpltune.renderer.scene.scene import Camera, Instance, Light, Material, Mesh, Scene, look_at, scaled
+
+Corner = np.ndarray | list[float]
+
+KINDS = ("room", "hall", "corridor", "courtyard", "two_rooms")
+
+_CUBE_SIDES = np.array(
+    # Outward: origin, u and v in the unit cube about the origin; u × v points out.
+    [
+        [[1, -1, -1], [0, 2, 0], [0, 0, 2]],
+        [[-1, -1, -1], [0, 0, 2], [0, 2, 0]],
+        [[-1, 1, -1], [0, 0, 2], [2, 0, 0]],
+        [[-1, -1, -1], [2, 0, 0], [0, 0, 2]],
+        [[-1, -1, 1], [2, 0, 0], [0, 2, 0]],
+        [[-1, -1, -1], [0, 2, 0], [2, 0, 0]],
+    ],
+    np.float64,
+)
+
+
+@dataclass
+class _Builder:
+    """Meshes and materials as they come, and the boxes in which nothing else may stand."""
+
+    random: np.random.Generator
+    meshes: list[Mesh] = field(default_factory=list)
+    materials: list[Material] = field(default_factory=list)
+    taken: list[Float64[np.ndarray, "2 3"]] = field(default_factory=list)
+
+    def material(self, grey: bool = False) -> int:
+        """A new colour: a wall's is light and pale, a thing's is any."""
+        level, tint = (self.random.uniform(0.5, 0.85), 0.1) if grey else (self.random.uniform(0.1, 0.8), 0.9)
+        hue = self.random.uniform(1.0 - tint, 1.0, 3)
+        color = np.clip(level * hue / hue.max(), 0.02, 0.9).astype(np.float32)
+        self.materials.append(Material(f"colour {len(self.materials)}", color))
+        return len(self.materials) - 1
+
+    def quads(self, name: str, corners: Float64[np.ndarray, "quads 3 3"], material: int) -> None:
+        """Parallelograms (origin, u, v); their normals are u × v."""
+        origin, u, v = corners[:, 0], corners[:, 1], corners[:, 2]
+        normals = np.cross(u, v)
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        positions = np.stack([origin, origin + u, origin + u + v, origin + v], axis=1).reshape(-1, 3)
+        first = 4 * np.arange(len(corners))[:, None, None]
+        count = len(positions)
+        self.meshes.append(
+            Mesh(
+                name,
+                positions.astype(np.float32),
+                np.repeat(normals, 4, axis=0).astype(np.float32),
+                np.zeros((count, 2), np.float32),
+                np.ones((count, 3), np.float32),
+                (first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3).astype(np.int32),
+                material,
+            )
+        )
+
+    def box(
+        self,
+        name: str,
+        low: Corner,
+        high: Corner,
+        material: int,
+        turn: float = 0.0,
+        kept: bool = True,
+    ) -> None:
+        """A closed box, turned about its vertical axis by `turn` radians."""
+        low, high = np.asarray(low, np.float64), np.asarray(high, np.float64)
+        center, half = (low + high) / 2.0, (high - low) / 2.0
+        c, s = math.cos(turn), math.sin(turn)
+        rotation = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+        sides = _CUBE_SIDES * half @ rotation.T
+        sides[:, 0] += center
+        self.quads(name, sides, material)
+        if kept:
+            reach = np.abs(rotation) @ half
+            self.taken.append(np.stack([center - reach, center + reach]))
+
+    def free(self, point: Float64[np.ndarray, "3"], room: float) -> bool:
+        return all((point < box[0] - room).any() or (point > box[1] + room).any() for box in self.taken)
+
+    def free_point(self, low: np.ndarray, high: np.ndarray, room: float) -> Float64[np.ndarray, "3"]:
+        """A point with that much room to the next box, if one is found; else the last tried."""
+        for _ in range(64):
+            point = self.random.uniform(low, high)
+            if self.free(point, room):
+                break
+        return point
+
+
+def generated_name(number: int) -> str:
+    """What the scene of that number is called: by its kind."""
+    return f"{KINDS[number % len(KINDS)]}-{number:03d}"
+
+
+def generated_scene(number: int, seed: int = 0) -> Scene:
+    """The scene of that number, with one camera and one light or two; the kinds take turns."""
+    random = np.random.default_rng([seed, number])
+    kind = KINDS[number % len(KINDS)]
+    width, height, depth = _size(kind, random)
+    low, high = np.array([-width / 2, 0.0, -depth / 2]), np.array([width / 2, height, depth / 2])
+    builder = _Builder(random)
+    _shell(builder, kind, low, high)
+    if kind == "two_rooms":
+        _partition(builder, low, high)
+    if kind in ("hall", "courtyard"):
+        _columns(builder, low, high)
+    _furnish(builder, low, high)
+    camera = _camera(builder, low, high)
+    lights = _lights(builder, kind, low, high)
+    scene = replace(_scene(generated_name(number), builder), cameras=(camera,), lights=lights)
+    return replace(scaled(scene, 10.0 ** random.uniform(-2.0, 2.0)), name=scene.name)
+
+
+def _scene(name: str, builder: _Builder) -> Scene:
+    """Each mesh placed once, as it is."""
+    return Scene(
+        name=name,
+        meshes=tuple(builder.meshes),
+        instances=tuple(Instance(mesh.name, i, np.eye(4)) for i, mesh in enumerate(builder.meshes)),
+        materials=tuple(builder.materials),
+    )
+
+
+def _size(kind: str, random: np.random.Generator) -> tuple[float, float, float]:
+    """Width, height and depth; a room is about as large as a room, before it is scaled."""
+    if kind == "corridor":
+        return random.uniform(1.2, 2.0), random.uniform(2.2, 3.0), random.uniform(7.0, 12.0)
+    if kind in ("hall", "courtyard"):
+        return random.uniform(8.0, 14.0), random.uniform(4.0, 7.0), random.uniform(8.0, 16.0)
+    return random.uniform(3.0, 6.0), random.uniform(2.2, 3.2), random.uniform(3.0, 6.0)
+
+
+def _shell(builder: _Builder, kind: str, low: np.ndarray, high: np.ndarray, without: str = "") -> None:
+    """Floor, walls and, but over a courtyard, a ceiling, all turned inwards; now and then in colours."""
+    size = high - low
+    x, y, z = np.diag(size)
+    walls = {
+        "floor": [low, z, x],
+        "left": [low, y, z],
+        "right": [low + x, z, y],
+        "back": [low, x, y],
+        "front": [low + z, y, x],
+    }
+    if kind != "courtyard":
+        walls["ceiling"] = [low + y, x, z]
+    walls.pop(without, None)
+    pale = builder.material(grey=True)
+    for name, corners in walls.items():
+        own = builder.random.uniform() < 0.4
+        builder.quads(name, np.array([corners]), builder.material() if own else pale)
+
+
+def _partition(builder: _Builder, low: np.ndarray, high: np.ndarray) -> None:
+    """A wall across, with a doorway."""
+    random, material = builder.random, builder.material(grey=True)
+    z = random.uniform(0.4, 0.6) * (high[2] - low[2]) + low[2]
+    thickness = random.uniform(0.05, 0.2)
+    width = random.uniform(0.7, 1.2)
+    start = random.uniform(low[0] + 0.1, high[0] - 0.1 - width)
+    top = min(2.0, 0.85 * high[1])
+    for name, a, b in (
+        ("wall before the door", (low[0], 0.0), (start, high[1])),
+        ("wall behind the door", (start + width, 0.0), (high[0], high[1])),
+        ("lintel", (start, top), (start + width, high[1])),
+    ):
+        builder.box(name, [a[0], a[1], z], [b[0], b[1], z + thickness], material)
+
+
+def _columns(builder: _Builder, low: np.ndarray, high: np.ndarray) -> None:
+    """Two rows of them."""
+    random, material = builder.random, builder.material(grey=True)
+    side, count = random.uniform(0.25, 0.6), int(random.integers(2, 5))
+    inset = random.uniform(0.18, 0.3) * (high[0] - low[0])
+    for x in (low[0] + inset, high[0] - inset):
+        for z in np.linspace(low[2], high[2], count + 2)[1:-1]:
+            builder.box(
+                "column", [x - side / 2, 0.0, z - side / 2], [x + side / 2, high[1], z + side / 2], material
+            )
+
+
+def _furnish(builder: _Builder, low: np.ndarray, high: np.ndarray) -> None:
+    """Crates, tables, shelves and boards, where nothing else stands."""
+    random = builder.random
+    floor = (high[0] - low[0]) * (high[2] - low[2])
+    for _ in range(int(random.integers(2, 5 + min(10, floor / 8.0)))):
+        reach = random.uniform(0.2, 0.22 * min(high[0] - low[0], 5.0))
+        place = builder.free_point(
+            np.array([low[0] + reach, 0.0, low[2] + reach]),
+            np.array([high[0] - reach, 0.0, high[2] - reach]),
+            reach,
+        )
+        if builder.free(place, reach):
+            piece = random.choice([_crate, _table, _shelf, _board])
+            piece(builder, place, reach, high[1], random.uniform(0.0, math.pi))
+
+
+def _crate(builder: _Builder, place: np.ndarray, reach: float, height: float, turn: float) -> None:
+    tall = builder.random.uniform(0.1, 0.7) * height
+    builder.box(
+        "crate",
+        place - np.array([reach, 0, reach]),
+        place + np.array([reach, tall, reach]),
+        builder.material(),
+        turn,
+    )
+
+
+def _table(builder: _Builder, place: np.ndarray, reach: float, height: float, turn: float) -> None:
+    top, material = 0.3 * height, builder.material()
+    builder.box(
+        "table",
+        place + np.array([-reach, top - 0.04, -reach]),
+        place + np.array([reach, top, reach]),
+        material,
+    )
+    for x in (-0.9, 0.8):
+        for z in (-0.9, 0.8):
+            corner = place + np.array([x, 0.0, z]) * reach
+            builder.box(
+                "leg", corner, corner + np.array([0.1 * reach, top - 0.04, 0.1 * reach]), material, kept=False
+            )
+
+
+def _shelf(builder: _Builder, place: np.ndarray, reach: float, height: float, turn: float) -> None:
+    material = builder.material()
+    tall = builder.random.uniform(0.5, 0.9) * height
+    deep = 0.4 * reach
+    for y in np.linspace(0.1 * tall, tall, int(builder.random.integers(3, 6))):
+        builder.box(
+            "shelf", place + np.array([-reach, y - 0.03, -deep]), place + np.array([reach, y, deep]), material
+        )
+    for x in (-reach, reach):
+        builder.box(
+            "side",
+            place + np.array([x - 0.02, 0.0, -deep]),
+            place + np.array([x + 0.02, tall, deep]),
+            material,
+            kept=False,
+        )
+
+
+def _board(builder: _Builder, place: np.ndarray, reach: float, height: float, turn: float) -> None:
+    tall = builder.random.uniform(0.4, 0.8) * height
+    low, high = place - np.array([reach, 0.0, 0.03]), place + np.array([reach, tall, 0.03])
+    builder.box("board", low, high, builder.material(), turn)
+
+
+def _camera(builder: _Builder, low: np.ndarray, high: np.ndarray) -> Camera:
+    """From near one end, at eye height, towards the other."""
+    size = high - low
+    near = low + size * [0.1, 0.4, 0.8]
+    eye = builder.free_point(near, low + size * [0.9, 0.7, 0.95], 0.05 * size.min())
+    target = builder.random.uniform(low + size * [0.2, 0.1, 0.0], low + size * [0.8, 0.6, 0.3])
+    return Camera(look_at(eye, target), math.radians(builder.random.uniform(45.0, 75.0)))
+
+
+def _lights(builder: _Builder, kind: str, low: np.ndarray, high: np.ndarray) -> tuple[Light, ...]:
+    """A sun over a courtyard; elsewhere a spot at whatever it meets, a lamp, or one of each."""
+    random, size = builder.random, high - low
+    power = float(size @ size)
+    if kind == "courtyard":
+        azimuth, slope = random.uniform(0.0, 2.0 * math.pi), random.uniform(0.7, 2.0)
+        direction = np.array([math.cos(azimuth), -slope, math.sin(azimuth)])
+        return (Light("directional", _tint(random), direction_world=direction / np.linalg.norm(direction)),)
+    place = builder.free_point(
+        low + size * [0.15, 0.4, 0.15], low + size * [0.85, 0.9, 0.85], 0.05 * size.min()
+    )
+    target = random.uniform(low + size * [0.1, 0.0, 0.1], low + size * [0.9, 0.7, 0.9])
+    # Not along its own length's worth of nothing: a target at the light itself gives no direction.
+    towards = (
+        target - place if np.linalg.norm(target - place) > 0.1 * size.min() else np.array([0.0, -1.0, 0.0])
+    )
+    outer = random.uniform(0.35, 1.0)
+    spot = Light(
+        "spot",
+        power * _tint(random),
+        place,
+        towards / np.linalg.norm(towards),
+        random.uniform(0.0, 0.9) * outer,
+        outer,
+    )
+    lamp = Light("point", 0.3 * power * _tint(random), place)
+    return ((spot,), (lamp,), (spot, replace(lamp, intensity=0.1 * lamp.intensity)))[
+        int(random.choice(3, p=(0.6, 0.3, 0.1)))
+    ]
+
+
+def _tint(random: np.random.Generator) -> Float64[np.ndarray, "3"]:
+    return random.uniform(0.7, 1.0, 3)
+
+
+def room_and_hall() -> Scene:
+    """A small room at z > 0 and a hall at z < 0, with a door between them about x = 0: fixed, not drawn."""
+    builder = _Builder(np.random.default_rng(7))
+    room_low, room_high = np.array([-1.6, 0.0, 0.0]), np.array([1.6, 2.5, 5.0])
+    hall_low, hall_high = np.array([-7.0, 0.0, -16.0]), np.array([7.0, 6.5, 0.0])
+    _shell(builder, "room", room_low, room_high, without="back")
+    _shell(builder, "hall", hall_low, hall_high, without="front")
+    wall = builder.material(grey=True)
+    for low, high in (([-7.0, 0.0], [-0.5, 6.5]), ([0.5, 0.0], [7.0, 6.5]), ([-0.5, 2.0], [0.5, 6.5])):
+        builder.box("wall", [*low, -0.15], [*high, 0.0], wall)
+    _columns(builder, hall_low, hall_high)
+    for place, reach in (([-1.1, 0.0, 1.0], 0.3), ([1.2, 0.0, 3.4], 0.3), ([3.5, 0.0, -4.0], 0.7)):
+        _crate(builder, np.array(place), reach, 2.5, 0.4)
+    _shelf(builder, np.array([-3.5, 0.0, -9.0]), 0.9, 3.0, 0.0)
+    return _scene("room-and-hall", builder)

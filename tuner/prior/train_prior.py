@@ -1,0 +1,182 @@
+"""Trains the prior that ships as `auto`: scenes in, a config with its card out."""
+
+import importlib.metadata
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float64
+
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.auto_prior import AutoPrior
+from vpltune.renderer.config.tuned_config import TunedConfig, write_config
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.files.atomic_file import write_text_whole
+from vpltune.renderer.gpu.gpu_context import create_context
+from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.placement import resolve_camera_and_lights
+from vpltune.renderer.scene.scene import Scene
+from vpltune.tuner.batch.scene_files import library_scenes
+from vpltune.tuner.evaluation.prepare_scene import Progress
+from vpltune.tuner.prior.prior_card import prior_card
+from vpltune.tuner.prior.prior_library import PriorScene, prior_scene
+from vpltune.tuner.prior.prior_training import (
+    FOLDS,
+    OwnFits,
+    TrainingRows,
+    own_fits,
+    row_losses,
+    train,
+    training_rows,
+)
+from vpltune.tuner.prior.scene_generator import generated_name, generated_scene
+from vpltune.tuner.surrogate.compiled_functions import keep_compiled_functions
+
+
+@dataclass(frozen=True, eq=False)
+class LearntPrior:
+    """A prior of all scenes, and for each scene one that has not seen it."""
+
+    scenes: tuple[PriorScene, ...]
+    fits: OwnFits
+    prior: AutoPrior
+    unseen: tuple[AutoPrior, ...]
+    """For each scene, the prior of the fold that leaves it out."""
+    losses: dict[str, Float64[np.ndarray, "measures scenes counts splits"]]
+    """Of `auto` (the unseen prior), `fit` (the scene's own) and `default`; measures: the fit's loss, relMSE;
+    splits: fitted, held out."""
+
+
+def learn_prior(scenes: tuple[PriorScene, ...], progress: Progress) -> LearntPrior:
+    """Fit each scene by itself, train on all, and train once more with every scene left out in turn.
+
+    Scenes are left out in `FOLDS` groups, which is harder than one by one: less is left to learn from.
+    """
+    progress("each scene's own fit", 0.0)
+    fits = own_fits(scenes)
+    rows = training_rows(scenes, fits)
+    progress("training", 0.0)
+    (prior,) = train(rows, np.zeros((1, len(scenes)), bool))
+    progress("training with scenes left out", 0.0)
+    fold = np.arange(len(scenes)) % FOLDS
+    of_folds = train(rows, fold == np.arange(FOLDS)[:, None])
+    unseen = tuple(of_folds[index] for index in fold)
+    return LearntPrior(scenes, fits, prior, unseen, _losses(scenes, rows, fits, unseen))
+
+
+def train_prior(
+    library: Path | None, generated: int, seed: int, output: Path, command: str | None, progress: Progress
+) -> dict[str, Any]:
+    """Learn from `generated` scenes and those of a library; write the config, and its card beside it as .md.
+
+    Captures and references are kept in the user's cache, so that what was stopped goes on where it was. A
+    scene of the library that cannot be read, or in which nothing is lit, is left out and named.
+
+    Raises:
+        InputError: the library cannot be read, or no scene is left.
+        MachineError: no OpenGL.
+    """
+    keep_compiled_functions()
+    scenes, left_out = collected_scenes(scene_sources(library, generated, seed), progress)
+    if len(scenes) < FOLDS:
+        raise InputError(f"train-prior: needs at least {FOLDS} scenes, got {len(scenes)}")
+    learnt = learn_prior(scenes, progress)
+    provenance: dict[str, str | int | float] = {
+        "vpltune": importlib.metadata.version("vpltune"),
+        "scenes": len(scenes),
+        "generated": generated,
+        "seed": seed,
+        **({} if command is None else {"command": command}),
+    }
+    config = TunedConfig(ArtistParameters(), provenance, "maps", learnt.prior)
+    write_text_whole(output.with_suffix(".md"), prior_card(learnt, config, left_out))
+    write_config(output, config)
+    return {
+        "output": str(output),
+        "card": str(output.with_suffix(".md")),
+        "scenes": [scene.name for scene in scenes],
+        "left_out": left_out,
+        "status": "ok",
+    }
+
+
+def scene_sources(library: Path | None, generated: int, seed: int) -> dict[str, Callable[[], Scene]]:
+    """Name to what makes or reads the scene, with a camera and lights.
+
+    Raises:
+        InputError: the library cannot be read, or has no scene.
+    """
+    made = {generated_name(number): partial(generated_scene, number, seed) for number in range(generated)}
+    files = {} if library is None else library_scenes(library, Path("out"))
+    return made | {name: partial(library_scene, path, name) for name, path in files.items()}
+
+
+def collected_scenes(
+    sources: Mapping[str, Callable[[], Scene]], progress: Progress
+) -> tuple[tuple[PriorScene, ...], dict[str, str]]:
+    """The captures of all scenes, and by name why some have none.
+
+    Raises:
+        MachineError: no OpenGL.
+    """
+    # One for all: those that runtimes make for themselves kept some 80 MiB a scene until the process ended.
+    context = create_context()
+    found: list[PriorScene] = []
+    left_out: dict[str, str] = {}
+    for index, (name, made) in enumerate(sources.items()):
+        progress(name, index / len(sources))
+        try:
+            scene = prior_scene(made(), context)
+        except InputError as error:
+            left_out[name] = str(error).rpartition(f"{name}: ")[2]
+            continue
+        # A view in which no light arrives has nothing to teach, and makes a mean over views meaningless.
+        if (scene.table.square.max(axis=(1, 2, 3)) > 0.0).all():
+            found.append(scene)
+        else:
+            left_out[name] = "no indirect light arrives in one of its views"
+    return tuple(found), left_out
+
+
+def library_scene(path: Path, name: str) -> Scene:
+    """A scene with the camera and the lights that a fit would give it.
+
+    Raises:
+        InputError: the scene or its sidecar cannot be used.
+    """
+    scene = read_scene(path)
+    camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
+    return replace(scene, name=name, cameras=(camera,), lights=lights)
+
+
+def _losses(
+    scenes: tuple[PriorScene, ...], rows: TrainingRows, fits: OwnFits, unseen: tuple[AutoPrior, ...]
+) -> dict[str, Float64[np.ndarray, "measures scenes counts splits"]]:
+    scene = np.asarray(rows.scene)
+    statistics = np.asarray(rows.statistics, np.float64)
+    points = np.array([unseen[s].point(row) for s, row in zip(scene, statistics, strict=True)], np.float32)
+    of_rows = {
+        "auto": np.asarray(row_losses(rows, jnp.asarray(points))),
+        "fit": np.asarray(rows.fit_loss),
+        "default": np.asarray(rows.default_loss),
+    }
+    counts = np.concatenate([each.vpl_count for each in scenes])
+    fitted = np.concatenate([each.fitted for each in scenes])
+
+    def means(values: np.ndarray, s: int) -> list[list[np.ndarray]]:
+        return [
+            [
+                values[:, (scene == s) & (counts == count) & (fitted == split)].mean(axis=1, dtype=np.float64)
+                for split in (True, False)
+            ]
+            for count in fits.vpl_counts
+        ]
+
+    return {
+        name: np.moveaxis(np.array([means(values, s) for s in range(len(scenes))]), -1, 0)
+        for name, values in of_rows.items()
+    }

@@ -1,0 +1,68 @@
+"""From a template to the text of a page that lies in one file and reaches for nothing outside it."""
+
+import base64
+import hashlib
+import importlib.metadata
+from functools import lru_cache
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from vpltune.tuner.report import page_text
+
+MAXIMUM_PAGE_BYTES = 8_000_000
+"""A page is no larger, so that it can be mailed and opens at once; what is left out is said."""
+
+
+def page_html(template: str, style: tuple[str, ...], script: str, **context: Any) -> str:
+    """The whole page.
+
+    Args:
+        template: name of the page's template.
+        style: names of its style sheets, joined in this order.
+        script: name of its script.
+        context: what the template shows. Strings come from scene files and are escaped.
+    """
+    environment = _environment()
+    css = "\n".join(_source(name) for name in style)
+    javascript = _source(script)
+    return environment.get_template(template).render(
+        policy=_policy(css, javascript),
+        # The project's own files, in which nothing may be escaped: the policy knows them by their hash.
+        style=Markup(css),
+        script=Markup(javascript),
+        version=importlib.metadata.version("vpltune"),
+        **context,
+    )
+
+
+@lru_cache
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("vpltune.tuner.report", "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    for wording in (page_text.number, page_text.seconds, page_text.ratio, page_text.words):
+        environment.filters[wording.__name__] = wording
+    return environment
+
+
+def _source(name: str) -> str:
+    environment = _environment()
+    return environment.loader.get_source(environment, name)[0]
+
+
+def _policy(css: str, javascript: str) -> str:
+    """Content security policy: our own style and script, pictures that lie in the page, and nothing else."""
+    style, script = (
+        base64.b64encode(hashlib.sha256(text.encode("utf-8")).digest()).decode("ascii")
+        for text in (css, javascript)
+    )
+    return (
+        f"default-src 'none'; img-src data:; style-src 'sha256-{style}'; script-src 'sha256-{script}'; "
+        "base-uri 'none'; form-action 'none'"
+    )

@@ -1,0 +1,78 @@
+"""Measures a config on a scene: default, tuned and ceiling against the reference."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.scene.views import write_views
+from vpltune.tuner.evaluation.error_breakdown import error_budget
+from vpltune.tuner.evaluation.evaluate import Evaluation, evaluate
+from vpltune.tuner.evaluation.prepare_scene import Progress, SceneOptions, Stopwatch, prepare_scene
+from vpltune.tuner.reference.cache import cache_folder
+from vpltune.tuner.reference.content_key import scene_digest
+from vpltune.tuner.scene_fit.fit_scene import default_like
+
+
+@dataclass(frozen=True, eq=False)
+class EvaluateOptions(SceneOptions):
+    """`tuned`: the config to measure. `views_path`: the file that `fixed_views` were read from."""
+
+    tuned: TunedConfig = field(default_factory=TunedConfig)
+    views_path: Path | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SceneEvaluation:
+    evaluation: Evaluation
+    document: dict[str, Any]
+    """What `vpltune evaluate --json` prints."""
+
+
+def evaluate_scene(scene_path: Path, options: EvaluateOptions, progress: Progress) -> SceneEvaluation:
+    """Measure a config on a scene's fitted and held-out views.
+
+    Raises:
+        InputError: the scene or its sidecar cannot be used.
+        MachineError: no OpenGL.
+    """
+    watch = Stopwatch()
+    prepared = prepare_scene(scene_path, options, options.tuned, watch, progress)
+    with watch.stage("evaluate"):
+        evaluation = evaluate(
+            prepared.scene,
+            prepared.runtime,
+            prepared.views,
+            default_like(options.tuned.parameters),
+            None if options.tuned.auto is not None else options.tuned.parameters,
+            seed=options.seed,
+            progress=lambda share: progress("evaluate", share),
+        )
+    budget = {}
+    if options.split_error:
+        with watch.stage("split error"):
+            budget["error_budget"] = error_budget(
+                prepared,
+                evaluation,
+                options,
+                lambda share: progress("split error", share),
+            )
+    views_path = options.views_path
+    if views_path is None:
+        # A report that names its views must name a file that others can read.
+        views_path = cache_folder() / "views" / f"{scene_digest(prepared.scene)[:16]}-{options.seed}.json"
+        write_views(views_path, str(scene_path), tuple(view.view for view in prepared.views))
+    document = {
+        "scene": str(scene_path),
+        "parameters": options.tuned.parameters.as_dict(),
+        "visibility": options.tuned.visibility,
+        "views": str(views_path),
+        "metrics": evaluation.summary(),
+        "seconds": {**watch.report(), "fit": 0.0},
+        "status": "ok",
+        **budget,
+        "ceiling_parameters": evaluation.ceiling_parameters.as_dict(),
+        "per_view": evaluation.per_view(),
+        "notes": [*prepared.notes, *evaluation.notes()],
+    }
+    return SceneEvaluation(evaluation, document)

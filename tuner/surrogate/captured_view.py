@@ -1,0 +1,134 @@
+"""One view as the tuner works on it: its reference, and what the runtime's buffers hold of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Bool, Float32
+
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.frame.capture import CapturedFrame
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.scene.views import View
+from vpltune.tuner.metrics.radiance import radiance
+from vpltune.tuner.metrics.view_metrics import ViewMetrics, view_metrics
+from vpltune.tuner.reference.reference_view import ReferenceView
+
+PIXELS_STEP = 512
+"""Pixel counts are rounded down to a multiple of this, so that views share compiled functions: 256 pixels
+are left out on average."""
+SAME_SURFACE = 0.02
+"""Share of a pixel's depth: farther apart, runtime and reference see two surfaces. A choice: rounding is a
+thousandth of it, and the gap behind a silhouette mostly more."""
+
+
+@dataclass(frozen=True, eq=False)
+class CapturedView:
+    """A view with its reference and its G-buffer and VPLs.
+
+    VPLs do not depend on the fitted parameters, so one capture serves the whole fit.
+    """
+
+    view: View
+    reference: ReferenceView
+    captured: CapturedFrame
+    drawn_with: ArtistParameters | None = None
+    """The parameters that `captured` was drawn with, where they are known."""
+    statistics: Float32[np.ndarray, " statistics"] | None = None
+    """What `renderer.config.scene_statistics` measures of it, where that was asked for."""
+    valid: Bool[np.ndarray, "height width"] = field(init=False)
+    """Where runtime and reference see the same surface: at silhouettes rasteriser and ray may differ."""
+
+    def __post_init__(self) -> None:
+        apart = np.linalg.norm(self.captured.position_world - self.reference.position_world, axis=-1)
+        same = apart <= SAME_SURFACE * self.captured.depth
+        object.__setattr__(self, "valid", self.captured.valid & self.reference.valid & same)
+
+    @property
+    def lit(self) -> bool:
+        """Whether any indirect light reaches it, by the reference; else no error has a measure."""
+        return bool(self.reference.irradiance[self.valid].any())
+
+    @property
+    def disagreement(self) -> float:
+        """Share of the pixels with a surface at which runtime and reference do not see the same one, in [0,
+        1]."""
+        seen = self.captured.valid | self.reference.valid
+        return float((seen & ~self.valid).sum() / seen.sum()) if seen.any() else 0.0
+
+    def usable_pixels(self) -> np.ndarray:
+        """Indices into the captured frame's valid pixels, of all those that are valid here."""
+        return np.flatnonzero(self.valid.ravel()[self.captured.valid.ravel()])
+
+    def fitted_pixels(self, limit: int, seed: int) -> np.ndarray:
+        """Indices into the captured frame's valid pixels, at most `limit`, drawn without replacement.
+
+        Whole multiples of `PIXELS_STEP`, so that views of one size share compiled functions; all where
+        there are fewer.
+        """
+        usable = self.usable_pixels()
+        count = min(len(usable), limit)
+        count = count // PIXELS_STEP * PIXELS_STEP if count >= PIXELS_STEP else count
+        if len(usable) == count:
+            return usable
+        return np.sort(np.random.default_rng(seed).choice(usable, count, replace=False))
+
+    def reference_radiance(self) -> Float32[np.ndarray, "height width 3"]:
+        """Direct plus indirect radiance of the reference, W/(m² sr)."""
+        reference = self.reference
+        return radiance(reference.albedo, reference.direct_irradiance, reference.irradiance)
+
+    def runtime_radiance(
+        self, indirect_irradiance: Float32[np.ndarray, "height width 3"]
+    ) -> Float32[np.ndarray, "height width 3"]:
+        """The runtime's direct light and albedo with some indirect irradiance, W/(m² sr)."""
+        return radiance(self.captured.albedo, self.captured.direct_irradiance, indirect_irradiance)
+
+    def metrics(self, indirect_irradiance: Float32[np.ndarray, "height width 3"]) -> ViewMetrics:
+        """How far an image with this indirect irradiance [W/m²] is from the reference, where both see the
+        same.
+
+        For FLIP the reference's light falls on the runtime's albedo: light is compared, not texture
+        filtering.
+        """
+        reference = self.reference
+        light = radiance(self.captured.albedo, reference.direct_irradiance, reference.irradiance)
+        same = self.valid[..., None]
+        return view_metrics(
+            indirect_irradiance,
+            reference.irradiance,
+            self.runtime_radiance(indirect_irradiance) * same,
+            light * same,
+            self.valid,
+        )
+
+
+def capture_views(
+    runtime: Runtime,
+    views: tuple[View, ...],
+    references: tuple[ReferenceView, ...],
+    *,
+    statistics: bool = False,
+) -> tuple[CapturedView, ...]:
+    """Draw and read back every view; `statistics` measures those of its scene too."""
+    captured = []
+    for view, reference in zip(views, references, strict=True):
+        frame = runtime.capture(view)
+        measured = runtime.scene_statistics(view) if statistics else None
+        captured.append(CapturedView(view, reference, frame, runtime.drawn_parameters(), measured))
+    return tuple(captured)
+
+
+def runtime_irradiance(
+    runtime: Runtime,
+    parameters: ArtistParameters,
+    view: CapturedView,
+    known: Sequence[CapturedView] = (),
+) -> Float32[np.ndarray, "height width 3"]:
+    """The runtime's own indirect irradiance of a view with `parameters`, drawn unless it is in `known` or
+    `view`."""
+    for each in (view, *known):
+        if each.drawn_with == parameters and each.view is view.view:
+            return each.captured.indirect_irradiance
+    runtime.parameters = parameters
+    return runtime.render(view.view, "irradiance")

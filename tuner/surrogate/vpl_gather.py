@@ -1,0 +1,222 @@
+"""The VPL gather in JAX: the twin of shaders/vpl_gather/vpl_gather.comp and shaders/common/vpl_irradiance.glsl.
+
+Points: Keller 1997 (instant radiosity), with the point spread over its footprint: 1/d² becomes
+1/(d² + (αl)²), which for α = 1 is the exact form factor of a coaxial disc. Cells: `tuner.surrogate.vpl_disc`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jax.custom_derivatives import SymbolicZero
+from jax.tree_util import PyTreeDef
+from jaxtyping import Array, Bool, Float
+
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.frame.vpl_disc_bounds import LEAST_RADIUS
+from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
+from vpltune.tuner.surrogate.vpl_disc import disc_form
+
+PAIRS_AT_ONCE = 2**19
+"""Receivers times VPLs in one go: 2 MiB an array, which stays in a core's cache, for any number of VPLs."""
+
+Pairs = Float[Array, "receivers vpls"]
+Visibility = Bool[Array, "receivers vpls"] | Float[Array, "receivers vpls"]
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class FalloffParameters:
+    """The continuous parameters of the gather; see `renderer.config.artist_parameters` for ranges and units."""
+
+    intensity: Float[Array, ""]
+    falloff_footprint: Float[Array, ""]
+    falloff_transmittance: Float[Array, ""]
+
+    @classmethod
+    def of(cls, parameters: ArtistParameters) -> "FalloffParameters":
+        """Those of a config."""
+        return cls(
+            jnp.float32(parameters.intensity),
+            jnp.float32(parameters.falloff_footprint),
+            jnp.float32(parameters.falloff_transmittance),
+        )
+
+
+def vpl_irradiance(
+    position: Float[Array, "3"],
+    normal: Float[Array, "3"],
+    vpl: VirtualPointLights,
+    parameters: FalloffParameters,
+) -> Float[Array, "3"]:
+    """Irradiance of one VPL at one receiver, lengths in units of L. Twin: `vpl_irradiance` in GLSL."""
+    to_vpl = vpl.position - position
+    # As in `pair_forms`.
+    squared = jnp.maximum(jnp.dot(to_vpl, to_vpl), 1e-18)
+    facing, height = jnp.dot(normal, to_vpl), -jnp.dot(vpl.normal, to_vpl)
+    footprint = parameters.falloff_footprint * vpl.footprint
+    if vpl.cells:
+        between = jnp.dot(normal, vpl.normal)
+        form = disc_form(squared, facing, height, between, jnp.maximum(footprint, LEAST_RADIUS))
+    else:
+        form = jnp.maximum(facing, 0.0) * jnp.maximum(height, 0.0) / squared / (squared + footprint**2)
+    transmittance = jnp.exp(-parameters.falloff_transmittance * jnp.sqrt(squared))
+    return vpl.flux * (parameters.intensity / jnp.pi * form * transmittance)
+
+
+def gather_pairwise(
+    receivers: Receivers, vpls: VirtualPointLights, parameters: FalloffParameters
+) -> Float[Array, "receivers 3"]:
+    """The gather as its definition reads, pair by pair: what `gather` is tested and timed against."""
+
+    def at(position: Float[Array, "3"], normal: Float[Array, "3"]) -> Float[Array, "3"]:
+        each = jax.vmap(vpl_irradiance, in_axes=(None, None, 0, None))
+        return each(position, normal, vpls, parameters).sum(axis=0)
+
+    return jax.vmap(at)(receivers.position, receivers.normal)
+
+
+def vpl_axes(vpls: VirtualPointLights) -> Float[Array, "6 vpls"]:
+    """The axes of their positions, then of their normals, each on its own."""
+    return jnp.concatenate([vpls.position.T, vpls.normal.T])
+
+
+def pair_forms(
+    receivers: Receivers, vpls: VirtualPointLights, axes: Float[Array, "6 vpls"]
+) -> tuple[Pairs, Callable[[Array], Pairs]]:
+    """Squared distances, and what gives each pair's irradiance, in units of Φ/π, for an α.
+
+    Written axis by axis, so that XLA fuses it all into one loop and no array of [receivers, vpls, 3] is made.
+    That is as fast as |x|² + |v|² − 2 x·v from a matrix product, whose three axes are too few to gain by, and
+    does not cancel: near contacts the matrix form lost three digits (1e-6 became 2e-3 relative RMSE).
+
+    Args:
+        receivers, vpls: in units of L.
+        axes: `vpl_axes(vpls)`, made outside of any loop over receivers, which would pick axes out of
+            [vpls, 3] again for every few pairs.
+    """
+    squared = facing = height = between = jnp.zeros(())
+    for axis in range(3):
+        to_vpl = axes[axis] - receivers.position[:, None, axis]
+        normal, vpl_normal = receivers.normal[:, None, axis], axes[3 + axis]
+        squared = squared + to_vpl**2
+        facing = facing + normal * to_vpl
+        height = height - vpl_normal * to_vpl
+        between = between + normal * vpl_normal
+    # Keeps quotients finite where receiver and VPL coincide; both cosines are 0 there. 1e-18 and not less:
+    # XLA may turn x/y/y into x/(y·y), and that square must still be a float32.
+    squared = jnp.maximum(squared, 1e-18)
+    if vpls.cells:
+
+        def disc(falloff_footprint: Array) -> Pairs:
+            radius = jnp.maximum(falloff_footprint * vpls.footprint, LEAST_RADIUS)
+            return disc_form(squared, facing, height, between, radius)
+
+        return squared, disc
+    cosines = jnp.maximum(facing, 0.0) * jnp.maximum(height, 0.0) / squared
+    return squared, lambda falloff_footprint: cosines / (squared + (falloff_footprint * vpls.footprint) ** 2)
+
+
+def receivers_at_once(vpls: int, pairs: int) -> int:
+    """How many receivers' pairs with all VPLs are about `pairs`: a power of two, at least 1."""
+    return 2 ** max((pairs // max(vpls, 1)).bit_length() - 1, 0)
+
+
+def gather(
+    receivers: Receivers,
+    vpls: VirtualPointLights,
+    parameters: FalloffParameters,
+    visibility: Visibility | None = None,
+) -> Float[Array, "receivers 3"]:
+    """Indirect irradiance [W/m²] at every receiver from all VPLs.
+
+    Args:
+        receivers, vpls: in units of L (see `tuner.surrogate.virtual_point_lights.gather_inputs`).
+        parameters: k, α, κ.
+        visibility: share of each VPL's light that reaches each receiver; None takes all of it, as the
+            runtime does without visibility maps.
+    """
+    scene, structure = jax.tree.flatten((receivers, vpls, visibility))
+    picture = _picture(structure, parameters.falloff_footprint, parameters.falloff_transmittance, *scene)
+    return picture * (parameters.intensity / jnp.pi)
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0,))
+def _picture(structure: PyTreeDef, footprint: Array, transmittance: Array, *scene: Array) -> Array:
+    """The gather for k = π; `scene` and its structure: receivers, VPLs and visibility."""
+    return _weighted_flux(partial(_weight, footprint, transmittance), *structure.unflatten(scene))
+
+
+@partial(_picture.defjvp, symbolic_zeros=True)
+def _picture_jvp(
+    structure: PyTreeDef, primals: tuple[Array, ...], tangents: tuple[Array | SymbolicZero, ...]
+) -> tuple[Array, Array]:
+    """What α and κ do to the picture is one more gather each. Reverse mode through every pair takes longer
+    than all three, most of all for discs."""
+    moving = [index for index, tangent in enumerate(tangents) if not isinstance(tangent, SymbolicZero)]
+    if any(index > 1 for index in moving):
+        # The scene moves as well.
+        def picture(*moved: Array) -> Array:
+            values = dict(enumerate(primals)) | dict(zip(moving, moved, strict=True))
+            return _picture.fun(structure, *values.values())
+
+        return jax.jvp(picture, [primals[index] for index in moving], [tangents[index] for index in moving])
+    footprint, transmittance, *scene = primals
+
+    def by_footprint(*pair: Any) -> Pairs:
+        return _derivative(lambda value: _weight(value, transmittance, *pair), footprint)
+
+    def by_transmittance(*pair: Any) -> Pairs:
+        return _derivative(lambda value: _weight(footprint, value, *pair), transmittance)
+
+    picture = _picture(structure, *primals)
+    tangent = jnp.zeros_like(picture)
+    for index in moving:
+        derivative = _weighted_flux((by_footprint, by_transmittance)[index], *structure.unflatten(scene))
+        tangent = tangent + derivative * tangents[index]
+    return picture, tangent
+
+
+def _derivative(function: Callable[[Array], Pairs], value: Array) -> Pairs:
+    return jax.jvp(function, (value,), (jnp.ones_like(value),))[1]
+
+
+def _weight(footprint: Array, transmittance: Array, squared: Pairs, form: Callable[[Array], Pairs]) -> Pairs:
+    """What each pair counts of the VPL's flux."""
+    return form(footprint) * jnp.exp(-transmittance * jnp.sqrt(squared))
+
+
+def _weighted_flux(
+    weight_of: Callable[[Pairs, Callable[[Array], Pairs]], Pairs],
+    receivers: Receivers,
+    vpls: VirtualPointLights,
+    visibility: Visibility | None,
+) -> Float[Array, "receivers 3"]:
+    """The sum of the VPLs' flux at every receiver, weighed by what is made of `pair_forms`."""
+    count = receivers.position.shape[0]
+    chunk_size = min(receivers_at_once(vpls.position.shape[0], PAIRS_AT_ONCE), max(count, 1))
+    padding = ((0, -count % chunk_size), (0, 0))
+    axes = vpl_axes(vpls)
+
+    def chunked(values: Array) -> Array:
+        return jnp.pad(values, padding).reshape(-1, chunk_size, values.shape[1])
+
+    # Made anew for its gradient: kept, all pairs of all chunks would be written out and read back, which took
+    # forty times as long and memory that grows with their number.
+    @partial(jax.checkpoint, prevent_cse=False)
+    def of_chunk(chunk: tuple[Array, Array, Array | None]) -> Array:
+        position, normal, visible = chunk
+        weight = weight_of(*pair_forms(Receivers(position, normal), vpls, axes))
+        if visible is not None:
+            weight = weight * visible
+        return jnp.matmul(weight, vpls.flux, precision=jax.lax.Precision.HIGHEST)
+
+    inputs = (
+        chunked(receivers.position),
+        chunked(receivers.normal),
+        None if visibility is None else chunked(visibility),
+    )
+    return jax.lax.map(of_chunk, inputs).reshape(-1, 3)[:count]

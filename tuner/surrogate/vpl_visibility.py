@@ -1,0 +1,189 @@
+"""What VPLs see, from their visibility maps, in JAX: the twin of shaders/common/vpl_visibility.glsl."""
+
+from dataclasses import dataclass, field
+from functools import lru_cache, partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Float32, Int
+
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.frame.capture import CapturedFrame, VisibilityMaps
+from vpltune.renderer.frame.visibility_map_layout import (
+    FRAME_TURNS_OVER,
+    VISIBILITY_LEAST_LIFT,
+    VISIBILITY_LIFT,
+)
+from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
+
+CHUNK = 128
+"""Receivers at once: 128 × 1,024 pairs are half a MiB an array, nine with vectors."""
+_PADDINGS = 4
+"""Of the room for blocks: in steps of so many-th parts of the texels."""
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class VisibilityParameters:
+    """bias: of the distance, how far two surfaces may overlap before one shades the other. softness: of the
+    distance, over which light then fades out."""
+
+    bias: Float[Array, ""]
+    softness: Float[Array, ""]
+
+    @classmethod
+    def of(cls, parameters: ArtistParameters) -> "VisibilityParameters":
+        """Those of a config."""
+        return cls(jnp.float32(parameters.visibility_bias), jnp.float32(parameters.visibility_softness))
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class MapTexels:
+    """All texels of all maps, VPL by VPL and row by row, then those of all blocks; in each VPL's frame."""
+
+    end: Float[Array, "texels 3"]
+    """Where the ray ended, from the map's origin [L]."""
+    normal: Float[Array, "texels 3"]
+    block_start: Int[Array, "vpls size size"]
+    """Where the finer texels begin that stand for this one; -1 where none do."""
+    refinement: int = field(metadata={"static": True})
+    """Texels along the side of a block."""
+
+
+def hemi_octahedral_encode(direction: Float[Array, "*n 3"]) -> Float[Array, "*n 2"]:
+    """Unit vectors of the upper hemisphere on [-1, 1]² (Cigolle et al. 2014, "hemi-oct"). Twin in GLSL."""
+    p = direction[..., :2] / (jnp.abs(direction[..., :2]).sum(-1, keepdims=True) + direction[..., 2:])
+    return jnp.stack([p[..., 0] + p[..., 1], p[..., 0] - p[..., 1]], axis=-1)
+
+
+def hemi_octahedral_decode(encoded: Float[Array, "*n 2"]) -> Float[Array, "*n 3"]:
+    """The inverse of `hemi_octahedral_encode`. Twin in GLSL."""
+    x = (encoded[..., 0] + encoded[..., 1]) / 2.0
+    y = (encoded[..., 0] - encoded[..., 1]) / 2.0
+    direction = jnp.stack([x, y, 1.0 - jnp.abs(x) - jnp.abs(y)], axis=-1)
+    return direction / jnp.linalg.norm(direction, axis=-1, keepdims=True)
+
+
+def hemisphere_frame(normal: Float[Array, "vpls 3"]) -> Float[Array, "vpls 3 3"]:
+    """Rows: two tangents and the normal, right-handed (Duff et al. 2017). Twin in GLSL."""
+    x, y, z = normal[:, 0], normal[:, 1], normal[:, 2]
+    s = jnp.where(z >= FRAME_TURNS_OVER, 1.0, -1.0)
+    a = -1.0 / (s + z)
+    b = x * y * a
+    tangent = jnp.stack([1.0 + s * x * x * a, s * b, -s * x], axis=-1)
+    bitangent = jnp.stack([b, s + y * y * a, -y], axis=-1)
+    return jnp.stack([tangent, bitangent, normal], axis=1)
+
+
+def map_texels(maps: VisibilityMaps) -> MapTexels:
+    """A frame's maps as `vpl_visibility` takes them."""
+    size, refinement = maps.distance.shape[1], maps.block_distance.shape[1]
+    end = _axes(size)[None] * maps.distance[..., None]
+    _, row, column = np.nonzero(maps.block >= 0)
+    inside = np.arange(refinement)
+    fine_row = (row[:, None] * refinement + inside)[:, :, None]
+    fine_column = (column[:, None] * refinement + inside)[:, None, :]
+    block_end = _axes(size * refinement)[fine_row, fine_column] * maps.block_distance[..., None]
+    # Frames have differing numbers of blocks; padding makes them few, so that little is compiled anew.
+    padding = ((0, -block_end.size // 3 % (1 + maps.distance.size // _PADDINGS)), (0, 0))
+    return MapTexels(
+        _joined(end, np.pad(block_end.reshape(-1, 3), padding)),
+        _joined(maps.normal, np.pad(maps.block_normal.reshape(-1, 3), padding)),
+        jnp.where(maps.block >= 0, maps.distance.size + maps.block * refinement**2, -1),
+        refinement,
+    )
+
+
+@lru_cache
+def _axes(size: int) -> Float32[np.ndarray, "size size 3"]:
+    """Directions of a map's texels. Twin: `visibility_axis` in GLSL."""
+    # In numpy, as `hemi_octahedral_decode`: array by array, JAX would compile each operation for itself.
+    centers = (np.arange(size, dtype=np.float32) + np.float32(0.5)) * np.float32(2.0 / size) - np.float32(1.0)
+    u, v = np.meshgrid(centers, centers)
+    x, y = (u + v) / 2.0, (u - v) / 2.0
+    direction = np.stack([x, y, 1.0 - np.abs(x) - np.abs(y)], axis=-1)
+    return (direction / np.linalg.norm(direction, axis=-1, keepdims=True)).astype(np.float32)
+
+
+def _joined(
+    texels: Float32[np.ndarray, "vpls size size 3"], details: Float32[np.ndarray, "n 3"]
+) -> Float[Array, "texels 3"]:
+    return jnp.concatenate([texels.reshape(-1, 3), details])
+
+
+def map_visibility(
+    captured: CapturedFrame, receivers: Receivers, vpls: VirtualPointLights, parameters: ArtistParameters
+) -> Float[Array, "receivers vpls"] | None:
+    """What the runtime takes the visibility to be: from the frame's maps, or None where it has none."""
+    if captured.visibility_maps is None:
+        return None
+    texels = map_texels(captured.visibility_maps)
+    return vpl_visibility(receivers, vpls, texels, VisibilityParameters.of(parameters))
+
+
+@jax.jit
+def vpl_visibility(
+    receivers: Receivers, vpls: VirtualPointLights, texels: MapTexels, parameters: VisibilityParameters
+) -> Float[Array, "receivers vpls"]:
+    """Share of each VPL's light that reaches each receiver, in [0, 1]. Twin: `vpl_visibility` in GLSL."""
+    return seen_share(surface_overlap(receivers, vpls, texels), parameters)
+
+
+def seen_share(overlap: Float[Array, "*shape"], parameters: VisibilityParameters) -> Float[Array, "*shape"]:
+    """Share of the light that passes a surface which overlaps the receiver by so much."""
+    return 1.0 - jnp.clip((overlap - parameters.bias) / parameters.softness, 0.0, 1.0)
+
+
+def visibility_origin(vpls: VirtualPointLights) -> Float[Array, "vpls 3"]:
+    """Where the rays of each VPL's map start [L]. Twin in GLSL."""
+    lift = jnp.maximum(VISIBILITY_LIFT * vpls.footprint, VISIBILITY_LEAST_LIFT)
+    return vpls.position + lift[:, None] * vpls.normal
+
+
+@jax.jit
+def surface_overlap(
+    receivers: Receivers, vpls: VirtualPointLights, texels: MapTexels
+) -> Float[Array, "receivers vpls"]:
+    """By how much, of the distance, what a VPL sees in a receiver's direction overlaps the receiver.
+
+    What the ray nearest to the receiver's direction met stands so far before the receiver's tangent plane
+    (receiver plane depth bias, Isidoro 2006), and the receiver so far behind its own: the lesser of the two.
+    Negative where nothing is between them, and -1 where no light passes anyway.
+
+    Args:
+        receivers, vpls: lengths in units of L.
+    """
+    size, refinement = texels.block_start.shape[1], texels.refinement
+    block_start = texels.block_start.reshape(-1)
+    frame = hemisphere_frame(vpls.normal)
+    origin = visibility_origin(vpls)
+    first = jnp.arange(len(vpls.position)) * size * size
+
+    def chunk(inputs: tuple[Array, Array]) -> Array:
+        position, normal_world = inputs
+        in_frame = partial(jnp.einsum, "rvk,vak->rva", precision="highest")
+        to_receiver = in_frame(position[:, None, :] - origin[None, :, :], frame)
+        normal = jnp.einsum("rk,vak->rva", normal_world, frame, precision="highest")
+        asked = (to_receiver[..., 2] > 0.0) & ((to_receiver * normal).sum(-1) < 0.0)
+        # Where not asked, any finite direction serves.
+        to_receiver = jnp.where(asked[..., None], to_receiver, jnp.array([0.0, 0.0, 1.0]))
+        place = (hemi_octahedral_encode(to_receiver) * 0.5 + 0.5) * size
+        texel = jnp.minimum(place.astype(jnp.int32), size - 1)
+        inside = jnp.minimum(((place - texel) * refinement).astype(jnp.int32), refinement - 1)
+        coarse = first + texel[..., 1] * size + texel[..., 0]
+        fine = block_start[coarse] + inside[..., 1] * refinement + inside[..., 0]
+        index = jnp.where(block_start[coarse] >= 0, fine, coarse)
+        end, met_normal = texels.end[index], texels.normal[index]
+        between = end - to_receiver
+        before, behind = (between * normal).sum(-1), (between * met_normal).sum(-1)
+        overlap = jnp.minimum(before, behind) / jnp.linalg.norm(to_receiver, axis=-1)
+        return jnp.where(asked, overlap, -1.0)
+
+    count = receivers.position.shape[0]
+    padding = ((0, -count % CHUNK), (0, 0))
+    inputs = tuple(
+        jnp.pad(values, padding).reshape(-1, CHUNK, 3) for values in (receivers.position, receivers.normal)
+    )
+    return jax.lax.map(chunk, inputs).reshape(-1, len(vpls.position))[:count]

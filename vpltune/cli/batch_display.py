@@ -1,0 +1,121 @@
+"""A batch while it runs, on stderr: bars on a terminal, a line for each scene anywhere else."""
+
+import contextlib
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+from vpltune.cli.report import one_line
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as Bars
+
+    from vpltune.tuner.batch.job import Job
+    from vpltune.tuner.batch.time_to_finish import Forecast
+
+STAGES = ("load", "reference", "capture", "fit", "evaluate")
+
+
+@contextlib.contextmanager
+def shown_batch(workers: int) -> Iterator["LineDisplay | BarDisplay"]:
+    """Whoever watches a batch of so many scenes at a time, until the block ends."""
+    from vpltune.tuner.batch.time_to_finish import Forecast
+
+    forecast = Forecast(workers)
+    if not sys.stderr.isatty():
+        yield LineDisplay(forecast)
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    # Texts are names of files: no markup.
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TextColumn("{task.fields[note]}", markup=False),
+    )
+    console = Console(stderr=True)
+    # Nothing else is redirected: with --json, stdout is not ours to draw on.
+    with Progress(*columns, console=console, redirect_stdout=False, redirect_stderr=False) as bars:
+        yield BarDisplay(forecast, bars)
+
+
+class LineDisplay:
+    """Plain lines: what is there to do, and each scene as it ends."""
+
+    def __init__(self, forecast: "Forecast") -> None:
+        self._forecast = forecast
+
+    def found(self, jobs: "Sequence[Job]", already_done: int) -> None:
+        self._forecast.found(jobs)
+        known = f", {already_done} have a record" if already_done else ""
+        _say(f"{len(jobs)} scene{'s' * (len(jobs) != 1)} to tune{known}")
+
+    def happened(self, event: dict[str, Any]) -> None:
+        self._forecast.happened(event, time.monotonic())
+        line = ending(event)
+        if line and event["event"] == "record":
+            done, left = self._forecast.done, time_left(self._forecast)
+            _say(f"[{done}/{self._forecast.total}] {line}{left}")
+        elif line:
+            _say(line)
+
+
+class BarDisplay:
+    """A bar for the whole batch and one for each scene at work; scenes that ended scroll away above."""
+
+    def __init__(self, forecast: "Forecast", bars: "Bars") -> None:
+        self._forecast = forecast
+        self._bars = bars
+        self._scenes: dict[str, Any] = {}
+
+    def found(self, jobs: "Sequence[Job]", already_done: int) -> None:
+        self._forecast.found(jobs)
+        self._already_done = already_done
+        self._whole = self._bars.add_task("scenes", total=len(jobs) + already_done, note="")
+        self._bars.update(self._whole, completed=already_done)
+
+    def happened(self, event: dict[str, Any]) -> None:
+        self._forecast.happened(event, time.monotonic())
+        key = event.get("key", "")
+        if event["event"] == "scene_started":
+            self._scenes[key] = self._bars.add_task(event["name"][-40:], total=len(STAGES), note="")
+        elif event["event"] == "stage" and key in self._scenes and event["stage"] in STAGES:
+            at = STAGES.index(event["stage"]) + event["share"]
+            self._bars.update(self._scenes[key], completed=at, note=event["stage"])
+        elif event["event"] == "record":
+            if key in self._scenes:
+                self._bars.remove_task(self._scenes.pop(key))
+            self._bars.advance(self._whole)
+        done, all_scenes = (self._already_done + n for n in (self._forecast.done, self._forecast.total))
+        self._bars.update(self._whole, note=f"{done} of {all_scenes}{time_left(self._forecast)}")
+        line = ending(event)
+        if line:
+            self._bars.console.print(line, markup=False, highlight=False)
+
+
+def ending(event: dict[str, Any]) -> str:
+    """A line for an event that ends something; empty for any other."""
+    if event["event"] == "attempt_failed":
+        return one_line(f"{event['name']}: attempt {event['attempt']} failed: {event['reason']}")
+    if event["event"] == "record":
+        status = event.get("fit") or event["status"]
+        why = "" if status in ("done", "improved") else f": {event['reason']}"
+        return one_line(f"{status} {event['name']} ({event['seconds']:.1f} s){why}")
+    return ""
+
+
+def time_left(forecast: "Forecast") -> str:
+    """The forecast in words, "; 3 to 5 min left"; empty while there is nothing to go by, and at the end."""
+    span = forecast.seconds_left(time.monotonic())
+    if span is None or span[1] <= 0.0:
+        return ""
+    low, high = span
+    unit, seconds = next(((u, s) for u, s in (("h", 3600), ("min", 60)) if high >= 2 * s), ("s", 1))
+    first, last = round(low / seconds), max(1, round(high / seconds))
+    return f"; {f'{first} to ' if first != last else ''}{last} {unit} left"
+
+
+def _say(text: str) -> None:
+    print(f"vpltune: {text}", file=sys.stderr, flush=True)

@@ -1,0 +1,60 @@
+"""`vpltune bench`: the benchmarks of a checkout, each figure beside what it is measured against."""
+
+from typing import Annotated
+
+import typer
+
+from vpltune.cli.options import JsonOption
+from vpltune.cli.report import Report
+from vpltune.renderer.errors import InputError
+
+
+def bench(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A benchmark, or `all`.")] = "all",
+    json: JsonOption = False,
+) -> Report:
+    """Run a benchmark: each row is a figure, what it is measured against, and their ratio."""
+    try:
+        from benchmarks import benchmark_names, run_benchmark
+        from benchmarks.harness.machine import machine_description
+    except ModuleNotFoundError as error:
+        raise InputError(
+            "bench: the benchmarks are not part of the installed package; run this from a checkout"
+        ) from error
+    from vpltune.cli.progress_display import shown_progress
+
+    known = benchmark_names()
+    if name != "all" and name not in known:
+        raise InputError(f"bench: NAME must be one of {', '.join([*known, 'all'])}, got {name!r:.60}")
+    rows = []
+    with shown_progress() as progress:
+        for chosen in known if name == "all" else (name,):
+            rows += run_benchmark(chosen, progress)
+    document = {"machine": machine_description(), "rows": [row.as_dict() for row in rows]}
+    return Report(document, (document["machine"], _table(document["rows"])))
+
+
+def _table(rows: list[dict]) -> object:
+    from rich.table import Table
+
+    table = Table()
+    for heading, justify in (
+        ("", "left"),
+        ("value", "right"),
+        ("unit", "left"),
+        ("against", "left"),
+        ("its value", "right"),
+        ("ratio", "right"),
+    ):
+        # Names are to be found again, and must not be cut.
+        table.add_column(heading, justify=justify, overflow="fold")
+    for row in rows:
+        table.add_row(
+            row["name"],
+            f"{row['value']:.4g}",
+            row["unit"],
+            row["against"],
+            f"{row['against_value']:.4g}",
+            f"{row['ratio']:.3g}",
+        )
+    return table

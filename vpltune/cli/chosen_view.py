@@ -1,0 +1,66 @@
+"""Which view a command draws: one of a views.json, or one placed from flags, the scene or by choice."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vpltune.cli.options import parse_size
+from vpltune.cli.report import warn
+from vpltune.cli.view_flags import camera_from_flags, light_from_flags
+from vpltune.cli.view_options import ViewFlags
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.scene.placement import resolve_camera_and_lights
+from vpltune.renderer.scene.scene import Camera, Light
+from vpltune.renderer.scene.views import View, read_views
+
+if TYPE_CHECKING:
+    from vpltune.renderer.scene.scene import Scene
+
+DEFAULT_SIZE = (960, 540)
+
+
+@dataclass(frozen=True)
+class ChosenView:
+    """What the command line says of a view, before the scene is read; None where it does not."""
+
+    from_file: View | None
+    camera: Camera | None
+    light: Light | None
+    size: tuple[int, int]
+
+    def placed(self, scene: "Scene", scene_path: Path) -> View:
+        """The view; what is not said comes from a file beside the scene or the scene, or is chosen, aloud."""
+        if self.from_file is not None:
+            return replace(self.from_file, size=self.size)
+        given = None if self.light is None else (self.light,)
+        camera, lights, notes = resolve_camera_and_lights(scene, scene_path, self.camera, given)
+        warn(notes)
+        return View("main", "fitted", self.size, camera, lights)
+
+
+def chosen_view(views: Path | None, name: str | None, size: str | None, flags: ViewFlags) -> ChosenView:
+    """`--views`, `--view`, `--size` and the flags of camera and light.
+
+    Raises:
+        InputError: they do not go together, or there is no such view, or a value is out of range.
+    """
+    from_file = _view_from_file(views, name, flags)
+    unasked = DEFAULT_SIZE if from_file is None else from_file.size
+    pixels = unasked if size is None else parse_size(size)
+    return ChosenView(from_file, camera_from_flags(flags), light_from_flags(flags), pixels)
+
+
+def _view_from_file(path: Path | None, name: str | None, flags: ViewFlags) -> View | None:
+    if path is None:
+        if name is not None:
+            raise InputError("--view: names a view of --views FILE, which is missing")
+        return None
+    if flags != ViewFlags():
+        raise InputError("--views: has its own camera and lights; leave out the camera and light flags")
+    found = read_views(path)
+    names = [view.name for view in found]
+    if name is None and len(found) > 1:
+        raise InputError(f"--view: must be given, {path} has {', '.join(names)}")
+    if name is not None and name not in names:
+        raise InputError(f"--view: {path} has {', '.join(names)}, got {name!r:.60}")
+    return found[0] if name is None else found[names.index(name)]

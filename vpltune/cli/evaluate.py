@@ -1,0 +1,79 @@
+"""`vpltune evaluate`: how close a config comes to the path tracer."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from vpltune.cli.options import (
+    LARGEST_VIEW_COUNT,
+    VIEW_COUNT,
+    BouncesOption,
+    JsonOption,
+    SceneArgument,
+    SeedOption,
+    SplitErrorOption,
+    VisibilityOption,
+)
+from vpltune.cli.report import Report, warn
+from vpltune.cli.view_options import ViewFlags, takes_view_flags
+from vpltune.renderer.errors import InputError
+
+
+@takes_view_flags
+def evaluate(
+    scene: SceneArgument,
+    config: Annotated[
+        str, typer.Option(metavar="FILE", help="The tuned config: a file, `default` or `auto`.")
+    ],
+    views: Annotated[
+        str, typer.Option(metavar="N|FILE", help="How many views are fitted, or the views.json of a fit.")
+    ] = str(VIEW_COUNT),
+    seed: SeedOption = 0,
+    visibility: VisibilityOption = None,
+    bounces: BouncesOption = "1",
+    split_error: SplitErrorOption = False,
+    *,
+    flags: ViewFlags,
+    json: JsonOption = False,
+) -> Report:
+    """Compare default, tuned and ceiling with the reference, on fitted and on held-out views and lights."""
+    from rich.markup import escape
+
+    from vpltune.cli.metrics_table import error_budget_table, metrics_table
+    from vpltune.cli.progress_display import shown_progress
+    from vpltune.cli.view_flags import camera_from_flags, light_from_flags
+    from vpltune.renderer.config.tuned_config import read_config
+    from vpltune.tuner.scene_fit.evaluate_scene import EvaluateOptions, evaluate_scene
+
+    options = EvaluateOptions(
+        tuned=read_config(config).seen_by(visibility),
+        seed=seed,
+        bounces=bounces,
+        split_error=split_error,
+        camera=camera_from_flags(flags),
+        light=light_from_flags(flags),
+        **_views(views, flags != ViewFlags()),
+    )
+    with shown_progress() as progress:
+        document = evaluate_scene(scene, options, progress).document
+    warn(tuple(document["notes"]))
+    shown = (
+        metrics_table(document["metrics"]),
+        *error_budget_table(document),
+        f"views: {escape(document['views'])}",
+    )
+    return Report(document, shown)
+
+
+def _views(text: str, placed: bool) -> dict[str, Any]:
+    """The options that say which views: how many, or exactly those of a file."""
+    from vpltune.renderer.scene.views import read_views
+
+    if text.isdecimal():
+        if not 1 <= len(text) <= 4 or not 1 <= int(text) <= LARGEST_VIEW_COUNT:
+            raise InputError(f"--views: must be from 1 to {LARGEST_VIEW_COUNT}, or a file, got {text:.60}")
+        return {"views": int(text)}
+    if placed:
+        raise InputError("--views: a file has its own cameras and lights; leave out the flags for them")
+    return {"views_path": Path(text), "fixed_views": read_views(Path(text))}

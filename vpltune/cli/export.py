@@ -1,0 +1,155 @@
+"""`vpltune export`: a config in the form another program takes, alone or with a scene to draw."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from vpltune.cli.options import JsonOption, VisibilityOption
+from vpltune.cli.report import Report, warn
+from vpltune.cli.view_options import (
+    PictureSizeOption,
+    ViewFlags,
+    ViewNameOption,
+    ViewsFileOption,
+    takes_view_flags,
+)
+from vpltune.renderer.errors import InputError
+
+if TYPE_CHECKING:
+    from vpltune.cli.chosen_view import ChosenView
+    from vpltune.renderer.config.tuned_config import TunedConfig
+    from vpltune.renderer.export.scene_bundle import SceneBundle
+
+Form = Literal["json", "glsl", "c", "std140", "gltf", "bundle", "web"]
+WITH_SCENE = ("gltf", "bundle", "web")
+WITH_VIEW = ("bundle", "web")
+
+
+@takes_view_flags
+def export(
+    file: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE",
+            help="A config, a glTF file that carries one, `default` or `auto`.",
+            show_default=False,
+        ),
+    ],
+    to: Annotated[
+        Form,
+        typer.Option(
+            help="Normalised JSON; GLSL constants or uniform block; a C header; the bytes of that block; the "
+            "extras of a copy of --scene; what it takes to draw --scene, as JSON and .bin; a web page of it."
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="OUT", help="The file to write; for a bundle, the folder."),
+    ],
+    scene: Annotated[
+        Path | None,
+        typer.Option(metavar="SCENE", help="gltf, bundle, web: the scene.", show_default=False),
+    ] = None,
+    size: PictureSizeOption = None,
+    visibility: VisibilityOption = None,
+    views: ViewsFileOption = None,
+    view: ViewNameOption = None,
+    *,
+    flags: ViewFlags,
+    json: JsonOption = False,
+) -> Report:
+    """Write a config for another program: as text, as bytes, into a glTF scene, or with a scene to draw."""
+    from rich.markup import escape
+
+    from vpltune.renderer.config.tuned_config import read_config
+
+    if to in WITH_SCENE and scene is None:
+        raise InputError(f"--scene: must be given with --to {to}")
+    if to not in WITH_SCENE and scene is not None:
+        raise InputError(f"--scene: --to {to} takes none")
+    if to not in WITH_VIEW and (flags != ViewFlags() or views or view or size):
+        raise InputError(
+            f"--to {to}: takes no camera, light, view or size; --to {' and '.join(WITH_VIEW)} do"
+        )
+    if to == "web" and output.suffix.lower() != ".html":
+        raise InputError(f"{output}: the file name must end in .html, got {output.suffix or 'no suffix'!r}")
+    config = read_config(file).seen_by(visibility)
+    fit = fit_outcome(config)
+    warn(fit_warnings(config))
+    if to in WITH_VIEW:
+        from vpltune.cli.chosen_view import chosen_view
+        from vpltune.renderer.export.config_export import refuse_prior
+
+        refuse_prior(config, to)
+        assert scene is not None
+        _write_with_view(config, to, output, _bundle(config, scene, chosen_view(views, view, size, flags)))
+    else:
+        _write(config, to, output, scene)
+    document = {
+        "output": str(output),
+        "to": to,
+        "visibility": config.visibility,
+        "parameters": config.parameters.as_dict(),
+        **({} if fit is None else {"fit": fit}),
+        "status": "ok",
+    }
+    return Report(document, (f"wrote {escape(str(output))}",))
+
+
+def fit_outcome(config: "TunedConfig") -> str | None:
+    """How the fit that wrote the config ended; None where no fit did, or does not say."""
+    status = config.provenance.get("status")
+    return status if isinstance(status, str) else None
+
+
+def fit_warnings(config: "TunedConfig") -> tuple[str, ...]:
+    """A sentence where what is exported is not better than the start of its fit."""
+    status = fit_outcome(config)
+    if status in (None, "improved"):
+        return ()
+    return (
+        f"this config is from a fit that ended {status}: {config.provenance.get('fit', 'no reason given')}",
+    )
+
+
+def _write(config: "TunedConfig", to: Form, output: Path, scene: Path | None) -> None:
+    import json
+
+    from vpltune.renderer.config.gltf_extras import write_gltf_extras
+    from vpltune.renderer.config.tuned_config import config_text
+    from vpltune.renderer.export.config_export import exported
+    from vpltune.renderer.files.atomic_file import written_whole
+
+    if to == "gltf":
+        assert scene is not None
+        write_gltf_extras(scene, output, json.loads(config_text(config)))
+        return
+    content = exported(config, to)
+    with written_whole(output) as temporary:
+        temporary.write_bytes(content)
+
+
+def _bundle(config: "TunedConfig", scene: Path, chosen: "ChosenView") -> "SceneBundle":
+    from vpltune.renderer.export.scene_bundle import scene_bundle
+    from vpltune.renderer.scene.files import read_scene
+
+    loaded = read_scene(scene)
+    warn(loaded.warnings)
+    drawn = chosen.placed(loaded, scene)
+    if loaded.animation is not None:
+        warn(("the scene's animation is left out: it stands as it does at rest",))
+    return scene_bundle(loaded, drawn, config)
+
+
+def _write_with_view(config: "TunedConfig", to: Form, output: Path, bundle: "SceneBundle") -> None:
+    from vpltune.renderer.export.scene_bundle import left_out, write_bundle
+    from vpltune.renderer.export.web_page import web_page
+    from vpltune.renderer.files.atomic_file import write_text_whole
+
+    unseen = left_out(config)
+    warn(unseen)
+    if to == "bundle":
+        write_bundle(output, bundle)
+    else:
+        write_text_whole(output, web_page(bundle, unseen))

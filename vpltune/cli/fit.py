@@ -1,0 +1,121 @@
+"""`vpltune fit`: a scene in, a tuned config out."""
+
+import shlex
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vpltune.cli.command_line import command_line
+from vpltune.cli.options import (
+    VIEW_COUNT,
+    BouncesOption,
+    JsonOption,
+    SceneArgument,
+    SeedOption,
+    SplitErrorOption,
+    StartOption,
+    ViewCountOption,
+    ViewSizeOption,
+    VisibilityOption,
+    parse_size,
+)
+from vpltune.cli.report import Report, warn
+from vpltune.cli.view_options import ViewFlags, takes_view_flags
+
+
+@takes_view_flags
+def fit(
+    scene: SceneArgument,
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="DIR", help="Folder for tuned.json, pictures and metrics."),
+    ],
+    config: StartOption = "default",
+    views: ViewCountOption = VIEW_COUNT,
+    size: ViewSizeOption = None,
+    seed: SeedOption = 0,
+    visibility: VisibilityOption = None,
+    vpl_count: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=65536,
+            help="How many VPLs to fit for; up to 256, their density is fitted too, over several rotations.",
+            show_default=False,
+        ),
+    ] = None,
+    budget_ms: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MS",
+            help="Choose VPL count and density for frames of this time on this machine.",
+            show_default=False,
+        ),
+    ] = None,
+    pareto: Annotated[
+        bool, typer.Option("--pareto", help="Write the whole front of error against frame time.")
+    ] = False,
+    frame_size: Annotated[
+        str | None,
+        typer.Option(metavar="WxH", help="Of the frames that are timed. [--size]", show_default=False),
+    ] = None,
+    motion: Annotated[
+        bool,
+        typer.Option("--motion", help="Accept only what flickers no more than the start as lights move."),
+    ] = False,
+    bounces: BouncesOption = "1",
+    split_error: SplitErrorOption = False,
+    *,
+    flags: ViewFlags,
+    json: JsonOption = False,
+) -> Report:
+    """Fit a scene: write DIR/tuned.json, views.json, metrics.json, and pictures before and after."""
+    from vpltune.cli.budget_flags import budget_from_flags, with_vpl_count
+    from vpltune.cli.progress_display import shown_progress
+    from vpltune.cli.view_flags import camera_from_flags, light_from_flags
+    from vpltune.renderer.config.tuned_config import read_config
+    from vpltune.tuner.fitting.fit_density import FEW_VPLS
+    from vpltune.tuner.scene_fit.fit_scene import FitOptions, fit_scene
+
+    start = with_vpl_count(read_config(config).seen_by(visibility), vpl_count)
+    options = FitOptions(
+        start=start,
+        density=vpl_count is not None and vpl_count <= FEW_VPLS,
+        budget=budget_from_flags(vpl_count, budget_ms, pareto, frame_size),
+        motion=motion,
+        views=views,
+        seed=seed,
+        bounces=bounces,
+        split_error=split_error,
+        camera=camera_from_flags(flags),
+        light=light_from_flags(flags),
+        command=command_line(),
+        **({} if size is None else {"size": parse_size(size)}),
+    )
+    with shown_progress() as progress:
+        result = fit_scene(scene, output, options, progress)
+    warn(result.notes)
+    return _report(result.document, output)
+
+
+def _report(document: dict, output: Path) -> Report:
+    from rich.markup import escape
+
+    from vpltune.cli.budget_flags import budget_lines, render_flags
+    from vpltune.cli.metrics_table import error_budget_table, metrics_table, parameters_table
+
+    config, picture = output / "tuned.json", output / "tuned.png"
+    command = ["vpltune", "render", document["scene"], "--config", str(config), "-o", str(picture)]
+    command += render_flags(document)
+    shown = (
+        parameters_table(document["parameters"], document["uncertainty"]),
+        metrics_table(document["metrics"]),
+        *error_budget_table(document),
+        escape(f"{document['status']}: {document['sentence']} ({document['seconds']['total']:.1f} s)"),
+        *budget_lines(document),
+        f"picture: {escape(str(output / 'comparison.png'))}",
+        f"next:    {escape(shlex.join(command))}",
+        f"report:  {escape(shlex.join(('vpltune', 'report', str(output))))}",
+    )
+    return Report(document, shown)

@@ -1,0 +1,203 @@
+"""`vpltune render`: one picture, or one layer of it, drawn by the runtime."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vpltune.cli.options import (
+    JsonOption,
+    Layer,
+    Motion,
+    SceneArgument,
+    VisibilityOption,
+    checked_scale,
+)
+from vpltune.cli.report import Report, warn
+from vpltune.cli.view_options import (
+    PictureSizeOption,
+    ViewFlags,
+    ViewNameOption,
+    ViewsFileOption,
+    takes_view_flags,
+)
+from vpltune.renderer.errors import InputError
+
+if TYPE_CHECKING:
+    from vpltune.renderer.frame.runtime import Runtime
+    from vpltune.renderer.scene.light_motion import BouncingLights
+    from vpltune.renderer.scene.scene import Scene
+    from vpltune.renderer.scene.views import View
+
+LARGEST_DYNAMIC_LIGHT_COUNT = 1_000_000
+DYNAMIC_LIGHT_SEED = 0
+
+
+@takes_view_flags
+def render(
+    scene: SceneArgument,
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="OUT",
+            help="A .png for display, or an .exr of linear float32; with --frames, an .mp4 or a folder.",
+        ),
+    ],
+    config: Annotated[
+        str, typer.Option(metavar="FILE", help="A tuned config, `default` or `auto`.")
+    ] = "default",
+    layer: Annotated[Layer, typer.Option(help="Which picture to draw.")] = "final",
+    size: PictureSizeOption = None,
+    visibility: VisibilityOption = None,
+    interleave: Annotated[
+        int, typer.Option(metavar="1|2|4|8", help="Blocks of NxN pixels share the VPLs out: faster above 1.")
+    ] = 1,
+    map_size: Annotated[
+        int | None,
+        typer.Option(
+            metavar="TEXELS",
+            min=4,
+            max=64,
+            help="Along the side of a VPL's visibility map. [24]",
+            show_default=False,
+        ),
+    ] = None,
+    map_refinement: Annotated[
+        int | None,
+        typer.Option(
+            metavar="1|2|4|8", help="How many times finer maps are at silhouettes. [4]", show_default=False
+        ),
+    ] = None,
+    rsm_resolution: Annotated[
+        int | None,
+        typer.Option(
+            metavar="TEXELS",
+            min=64,
+            max=8192,
+            help="Along the side of a light's map of shadows and VPLs. [1024; 512 for point lights]",
+            show_default=False,
+        ),
+    ] = None,
+    dynamic_lights: Annotated[
+        int,
+        typer.Option(
+            metavar="N", min=0, max=LARGEST_DYNAMIC_LIGHT_COUNT, help="Add N small lights that fly about."
+        ),
+    ] = 0,
+    frames: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Draw a clip: N frames of the scene in motion.")
+    ] = None,
+    fps: Annotated[float, typer.Option(metavar="F", help="Frames per second of the clip.")] = 30.0,
+    motion: Annotated[
+        Motion, typer.Option(help="What moves besides the scene's animation; auto: both where it has none.")
+    ] = "auto",
+    scale: Annotated[float, typer.Option(help="Draw scene, camera and light this much larger.")] = 1.0,
+    views: ViewsFileOption = None,
+    view: ViewNameOption = None,
+    *,
+    flags: ViewFlags,
+    json: JsonOption = False,
+) -> Report:
+    """Draw a scene with a config, headless."""
+    from vpltune.cli.chosen_view import chosen_view
+    from vpltune.cli.render_clip import write_clip
+    from vpltune.renderer.config.tuned_config import read_config
+    from vpltune.renderer.files.image_file import require_extension
+    from vpltune.renderer.files.video_file import check_clip_path
+    from vpltune.renderer.frame.runtime_options import INTERLEAVES, REFINEMENTS
+
+    # All that can be refused is refused before the scene is read.
+    chosen = chosen_view(views, view, size, flags)
+    if frames is None:
+        require_extension(output, ".png", ".exr")
+    else:
+        check_clip_path(output, chosen.size)
+    if not (math.isfinite(fps) and 0.1 <= fps <= 1000.0):
+        raise InputError(f"--fps: must lie in [0.1, 1000], got {fps}")
+    factor = checked_scale(scale)
+    if interleave not in INTERLEAVES:
+        raise InputError(f"--interleave: must be one of {INTERLEAVES}, got {interleave}")
+    if map_refinement is not None and map_refinement not in REFINEMENTS:
+        raise InputError(f"--map-refinement: must be one of {REFINEMENTS}, got {map_refinement}")
+    tuned = read_config(config).seen_by(visibility)
+
+    from vpltune.renderer.frame.runtime import Runtime
+    from vpltune.renderer.frame.runtime_options import RuntimeOptions
+    from vpltune.renderer.scene.files import read_scene
+    from vpltune.renderer.scene.scene import scaled
+    from vpltune.renderer.scene.sequence import Sequence
+    from vpltune.renderer.scene.views import scaled_view
+
+    loaded = read_scene(scene)
+    warn(loaded.warnings)
+    drawn = chosen.placed(loaded, scene)
+    sequence = Sequence(loaded, drawn, motion, factor)
+    if factor != 1.0:
+        loaded, drawn = scaled(loaded, factor), scaled_view(drawn, factor)
+    options = RuntimeOptions(
+        interleave=interleave,
+        visibility_map_size=map_size or RuntimeOptions.visibility_map_size,
+        visibility_map_refinement=map_refinement or RuntimeOptions.visibility_map_refinement,
+        # A clip is eased over a quarter of a second; a still takes what it asks for.
+        adaptation_frames=0.0 if frames is None else fps / 4.0,
+    )
+    runtime = Runtime(loaded, tuned, options, rsm_resolution=rsm_resolution)
+    bouncing = _bouncing_lights(loaded, drawn, dynamic_lights)
+    if frames is None:
+        _write_layer(runtime, drawn, layer, output, bouncing)
+    else:
+        write_clip(runtime, sequence, layer, output, frames, fps, bouncing)
+    clip = {} if frames is None else {"frames": frames, "fps": fps}
+    return _report(scene, output, layer, runtime.drawn_parameters().as_dict(), drawn, clip)
+
+
+def _bouncing_lights(scene: "Scene", view: "View", count: int) -> "BouncingLights | None":
+    from vpltune.renderer.scene.light_motion import BouncingLights, flux_beside
+
+    if not count:
+        return None
+    return BouncingLights(scene, count, DYNAMIC_LIGHT_SEED, flux_beside(scene, view.lights))
+
+
+def _write_layer(
+    runtime: "Runtime", view: "View", layer: Layer, output: Path, bouncing: "BouncingLights | None"
+) -> None:
+    from vpltune.cli.layer_display import for_display
+    from vpltune.renderer.files.image_file import write_exr, write_png
+    from vpltune.renderer.scene.dynamic_lights import DynamicLights
+
+    lights = None if bouncing is None else DynamicLights(bouncing.records)
+    if output.suffix.lower() == ".exr":
+        # The final picture without its tone curve is the radiance that reaches the eye.
+        pixels = (
+            runtime.render_radiance(view, lights)
+            if layer == "final"
+            else runtime.render(view, layer, lights=lights)
+        )
+        write_exr(output, pixels, "Z" if layer == "depth" else "Y")
+    else:
+        write_png(output, for_display(runtime, layer, runtime.render(view, layer, lights=lights)))
+
+
+def _report(
+    scene: Path, output: Path, layer: Layer, parameters: dict, view: "View", clip: dict[str, int | float]
+) -> Report:
+    from rich.markup import escape
+
+    from vpltune.renderer.scene.views import views_to_json
+
+    document = {
+        "scene": str(scene),
+        "output": str(output),
+        "layer": layer,
+        "parameters": parameters,
+        "view": views_to_json(str(scene), (view,))["views"][0],
+        **clip,
+        "status": "ok",
+    }
+    width, height = view.size
+    length = f", {clip['frames']} frames" if clip else ""
+    return Report(document, (f"wrote {escape(str(output))} ({layer}, {width}x{height}{length})",))

@@ -1,0 +1,66 @@
+"""What a command hands back, and how it reaches the user: one JSON object, or text and tables."""
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from vpltune.renderer.files.strict_json import strict_json
+
+OK = 0
+BAD_INPUT = 2
+MACHINE_LACKS = 3
+PARTLY_DONE = 4
+INTERRUPTED = 130
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """The outcome of a command."""
+
+    document: Mapping[str, Any]
+    """What `--json` prints."""
+    shown: tuple[Any, ...]
+    """What is printed without it: strings (rich markup) and rich tables."""
+    exit_code: int = OK
+
+
+@contextlib.contextmanager
+def stdout_sent_to_stderr() -> Iterator[None]:
+    """Everything that would reach stdout goes to stderr, a library's own printing from C included."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        with contextlib.redirect_stdout(sys.stderr):
+            yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+
+
+def print_report(report: Report) -> None:
+    """Print the text and tables of `report` on stdout."""
+    from rich.console import Console
+
+    console = Console(highlight=False, soft_wrap=True)
+    for item in report.shown:
+        console.print(item)
+
+
+def print_json(document: Mapping[str, Any]) -> None:
+    """Print `document` on stdout as one JSON object; a number that is not finite becomes null."""
+    print(strict_json(document), flush=True)
+
+
+def warn(lines: tuple[str, ...]) -> None:
+    """Print each line on stderr as a warning."""
+    for line in lines:
+        print(f"vpltune: {one_line(line)}", file=sys.stderr)
+
+
+def one_line(text: object) -> str:
+    """`text` with every run of white space made one space."""
+    return " ".join(str(text).split())

@@ -1,0 +1,114 @@
+"""Camera and light from flags: what may be given together, checked in one place."""
+
+import math
+
+import numpy as np
+from jaxtyping import Float64
+
+from vpltune.cli.options import parse_numbers
+from vpltune.cli.view_options import ViewFlags
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.scene.scene import Camera, Light, look_at
+from vpltune.renderer.scene.views import check_cone
+
+DEFAULT_YFOV_DEGREES = 50.0
+DEFAULT_CONE_DEGREES = (0.0, 45.0)
+"""KHR_lights_punctual's own defaults."""
+
+
+def camera_from_flags(flags: ViewFlags) -> Camera | None:
+    """The camera that the flags describe, or None where none is given.
+
+    Raises:
+        InputError: only part of a camera is given, or a value is out of range.
+    """
+    if flags.eye is None and flags.look_at is None and flags.yfov is None:
+        return None
+    if flags.eye is None or flags.look_at is None:
+        raise InputError("--eye and --look-at: a camera needs both")
+    eye = _vector(flags.eye, "--eye")
+    target = _vector(flags.look_at, "--look-at")
+    if (eye == target).all():
+        raise InputError(f"--look-at: must differ from --eye, got {flags.look_at} twice")
+    yfov = DEFAULT_YFOV_DEGREES if flags.yfov is None else flags.yfov
+    if not 1.0 <= yfov <= 170.0:
+        raise InputError(f"--yfov: must be from 1 to 170 degrees, got {yfov}")
+    return Camera(look_at(eye, target), math.radians(yfov))
+
+
+def light_from_flags(flags: ViewFlags) -> Light | None:
+    """The light that the flags describe, or None where none is given.
+
+    Raises:
+        InputError: a flag is missing for its type or does not go with it, or a value is out of range.
+    """
+    given = {
+        "--light-position": flags.light_position,
+        "--light-look-at": flags.light_look_at,
+        "--light-direction": flags.light_direction,
+        "--light-intensity": flags.light_intensity,
+        "--light-cone": flags.light_cone,
+    }
+    present = [flag for flag, value in given.items() if value is not None]
+    if flags.light_type is None:
+        if present:
+            raise InputError(f"--light-type: must be given with {present[0]}")
+        return None
+    intensity = _intensity(flags.light_intensity)
+    if flags.light_type == "point":
+        _refuse(present, "point", "--light-look-at", "--light-direction", "--light-cone")
+        return Light("point", intensity, _position(flags), name="from flags")
+    if flags.light_type == "directional":
+        _refuse(present, "directional", "--light-cone")
+        if flags.light_position is not None and flags.light_look_at is None:
+            raise InputError("--light-position: a directional light takes it only with --light-look-at")
+        return Light("directional", intensity, direction_world=_direction(flags), name="from flags")
+    inner, outer = _cone(flags.light_cone)
+    return Light("spot", intensity, _position(flags), _direction(flags), inner, outer, name="from flags")
+
+
+def _vector(text: str, flag: str) -> Float64[np.ndarray, "3"]:
+    return np.array(parse_numbers(text, flag, (3,)), np.float64)
+
+
+def _intensity(text: str | None) -> Float64[np.ndarray, "3"]:
+    numbers = [1.0] if text is None else parse_numbers(text, "--light-intensity", (1, 3))
+    if min(numbers) < 0.0 or max(numbers) == 0.0:
+        raise InputError(f"--light-intensity: must not be negative or all zero, got {text}")
+    return np.array(numbers * (3 // len(numbers)), np.float64)
+
+
+def _position(flags: ViewFlags) -> Float64[np.ndarray, "3"]:
+    if flags.light_position is None:
+        raise InputError(f"--light-position: a {flags.light_type} light needs it")
+    return _vector(flags.light_position, "--light-position")
+
+
+def _direction(flags: ViewFlags) -> Float64[np.ndarray, "3"]:
+    if (flags.light_direction is None) == (flags.light_look_at is None):
+        raise InputError(
+            f"--light-direction: a {flags.light_type} light needs either it or --light-look-at, and not both"
+        )
+    if flags.light_direction is not None:
+        flag, direction = "--light-direction", _vector(flags.light_direction, "--light-direction")
+    else:
+        flag, direction = (
+            "--light-look-at",
+            _vector(str(flags.light_look_at), "--light-look-at") - _position(flags),
+        )
+    length = float(np.linalg.norm(direction))
+    if not length > 0.0:
+        raise InputError(f"{flag}: gives the light no direction")
+    return direction / length
+
+
+def _cone(text: str | None) -> tuple[float, float]:
+    inner, outer = DEFAULT_CONE_DEGREES if text is None else parse_numbers(text, "--light-cone", (2,))
+    check_cone(math.radians(inner), math.radians(outer), "--light-cone (radians)")
+    return math.radians(inner), math.radians(outer)
+
+
+def _refuse(present: list[str], light_type: str, *flags: str) -> None:
+    for flag in flags:
+        if flag in present:
+            raise InputError(f"{flag}: a {light_type} light has none")

@@ -1,0 +1,71 @@
+"""The options that say which view a command draws or fits: one definition of each, for every command."""
+
+import functools
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from vpltune.cli.report import Report
+
+VIEW_PANEL = "Camera and light, in world units (else: the scene's own, or chosen)"
+
+PictureSizeOption = Annotated[str | None, typer.Option(metavar="WxH", help="Picture size. [960x540]")]
+ViewsFileOption = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Take camera, lights and size from a views.json.")
+]
+ViewNameOption = Annotated[str | None, typer.Option(metavar="NAME", help="Which of its views.")]
+
+
+def _view_option(metavar: str, description: str) -> typer.models.OptionInfo:
+    return typer.Option(metavar=metavar, help=description, show_default=False, rich_help_panel=VIEW_PANEL)
+
+
+@dataclass(frozen=True)
+class ViewFlags:
+    """Camera and light as given on the command line; None where absent."""
+
+    eye: Annotated[str | None, _view_option("X,Y,Z", "Where the camera stands.")] = None
+    look_at: Annotated[str | None, _view_option("X,Y,Z", "What it looks at, with +Y up.")] = None
+    yfov: Annotated[float | None, _view_option("DEG", "Vertical angle of view, in degrees. [50]")] = None
+    light_type: Annotated[
+        Literal["spot", "point", "directional"] | None, _view_option("TYPE", "spot, point or directional.")
+    ] = None
+    light_position: Annotated[str | None, _view_option("X,Y,Z", "Where a spot or point light stands.")] = None
+    light_look_at: Annotated[str | None, _view_option("X,Y,Z", "What the light points at.")] = None
+    light_direction: Annotated[str | None, _view_option("X,Y,Z", "The way the light travels.")] = None
+    light_intensity: Annotated[
+        str | None, _view_option("I or R,G,B", "W/sr (spot, point) or W/m² (directional). [1]")
+    ] = None
+    light_cone: Annotated[
+        str | None, _view_option("INNER,OUTER", "A spot's half angles, in degrees. [0,45]")
+    ] = None
+
+
+def takes_view_flags(command: Callable[..., Report]) -> Callable[..., Report]:
+    """A command whose parameter `flags: ViewFlags` is one option a field on the command line.
+
+    typer reads a command's options from its signature: there, the fields stand where `flags` did.
+    """
+    names = [field.name for field in fields(ViewFlags)]
+
+    @functools.wraps(command)
+    def with_options(**given: object) -> Report:
+        flags = ViewFlags(**{name: given.pop(name) for name in names})
+        return command(**given, flags=flags)
+
+    parameters = []
+    for parameter in inspect.signature(command).parameters.values():
+        if parameter.annotation is ViewFlags:
+            parameters += [
+                parameter.replace(name=field.name, default=field.default, annotation=field.type)
+                for field in fields(ViewFlags)
+            ]
+        else:
+            parameters.append(parameter)
+    with_options.__signature__ = inspect.Signature(parameters, return_annotation=Report)
+    with_options.__annotations__ = {each.name: each.annotation for each in parameters}
+    return with_options

@@ -19,7 +19,7 @@ help: ## list the targets
 
 setup: $(PYTHON_STAMP) ## system libraries, virtual environment, Python packages
 
-demo: setup ## fit the shipped Cornell box; pictures and numbers go to out/demo
+demo: setup ## fit the shipped Cornell box; images and numbers go to out/demo
 	@$(BIN)/vpltune fit configs/scenes/cornell-box.glb -o out/demo
 
 test: setup $(TEST_STAMP) ## the tests that a change must pass

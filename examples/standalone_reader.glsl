@@ -132,7 +132,7 @@ void main() {
         float form = cells > 0
             ? disc_form(d / scene_length, n, m, footprint / scene_length) / (scene_length * scene_length)
             : max(dot(n, d), 0.0) * max(-dot(m, d), 0.0) / dd / (dd + footprint * footprint);
-        form *= exp(-falloff_transmittance * sqrt(dd) / scene_length);
+        form *= exp(-extinction_coefficient * sqrt(dd) / scene_length);
         if (form > 0.0) { irradiance += vpls[i + 2].rgb * (intensity / PI * form * visibility(i, p, n)); }
     }
     for (int i = 0; i < lights.length(); ++i) {

@@ -95,12 +95,12 @@ def main(folder, output):
     context = moderngl.create_standalone_context(require=430, backend="egl")
     surfaces = Surfaces(context, bundle, (Path(folder) / "bundle.bin").read_bytes())
     atlas = light_maps(surfaces, rsm)
-    pictures = surfaces.seen(size, camera, view["tan_half_fov"])
-    vpls, length = virtual_point_lights(atlas, np.dstack([pixels(one) for one in pictures]), bundle)
+    images = surfaces.seen(size, camera, view["tan_half_fov"])
+    vpls, length = virtual_point_lights(atlas, np.dstack([pixels(one) for one in images]), bundle)
     for binding, content in ((4, vpls), (5, bytes(16 * max(maps["map_room"], 1))), (6, bytes(4))):
         context.buffer(content).bind_to_storage_buffer(binding)
-    numbers["falloff_transmittance"] *= bundle["config"]["visibility"] != "none"
-    cells = bundle["vpl_cells"]
+    numbers["extinction_coefficient"] *= bundle["config"]["visibility"] != "none"
+    cells = bundle["clustered_discs"]
     numbers |= {"scene_length": length, "face_size": rsm["resolution"], "cells": cells["steps"]}
     numbers |= cells["disc"] | maps
     if maps["map_room"] > 0:
@@ -109,7 +109,7 @@ def main(folder, output):
             context.compute_shader(shader(stage, numbers.items())).run(len(vpls), groups)
             context.memory_barrier()
     depths = context.texture(atlas.shape[1::-1], 1, atlas[..., 3].astype("f4").tobytes(), dtype="f4")
-    for unit, texture in enumerate([*pictures, depths]):
+    for unit, texture in enumerate([*images, depths]):
         texture.use(unit)
     radiance = context.texture(size, 4, dtype="f4")
     radiance.bind_to_image(0)

@@ -16,7 +16,7 @@ def virtual_point_lights(atlas, seen, bundle):
         return np.tile(DARK, (bundle["config"]["parameters"]["vpl_count"], 1)).astype("f4"), 1.0
     offset = position - (flux[..., None] * position).sum((0, 1)) / flux.sum()
     length = np.sqrt((flux * (offset**2).sum(-1)).sum() / flux.sum())
-    parameters, rules = bundle["config"]["parameters"], bundle["vpl_cells"]
+    parameters, rules = bundle["config"]["parameters"], bundle["clustered_discs"]
     weight = np.where(flux > 0, flux ** parameters["density_exponent"], 0)
     if bundle["vpl_importance"]["cells"] > 0:
         weight *= importance(atlas, seen, bundle) ** parameters["density_importance"]
@@ -32,9 +32,9 @@ def virtual_point_lights(atlas, seen, bundle):
 
 
 def importance(atlas, seen, bundle):
-    """For each texel, how much error its light would leave on the picture if it were drawn too seldom.
+    """For each texel, how much error its light would leave on the image if it were drawn too seldom.
 
-    Cells of 16 texels of the atlas light some points of the picture, without visibility. The chances of least
+    Cells of 16 texels of the atlas light some points of the image, without visibility. The chances of least
     relative error are sqrt(sum of squares of what a point gets from the cell, over what it gets from all).
     """
     rules, size = bundle["vpl_importance"], bundle["rsm"]["resolution"]

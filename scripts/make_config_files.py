@@ -3,7 +3,8 @@
 import json
 from pathlib import Path
 
-from vpltune.renderer.config.tuned_config import TunedConfig, config_schema, config_text
+from vpltune.renderer.config.config_schema import config_schema
+from vpltune.renderer.config.tuned_config import TunedConfig, config_text
 from vpltune.renderer.files.atomic_file import write_text_whole
 
 CONFIGS = Path(__file__).resolve().parents[1] / "configs"

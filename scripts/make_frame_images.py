@@ -12,7 +12,7 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.image_file import write_png
 from vpltune.renderer.files.srgb import srgb_from_linear
-from vpltune.renderer.frame.capture import octahedral_decode, read_picture
+from vpltune.renderer.frame.capture import octahedral_decode, read_image
 from vpltune.renderer.frame.frame import Frame
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
@@ -24,7 +24,7 @@ from vpltune.renderer.scene.views import View
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 SCENE = REPOSITORY / "configs" / "scenes" / "gallery.glb"
-PICTURE = REPOSITORY / "docs" / "frame_buffers.png"
+IMAGE = REPOSITORY / "docs" / "frame_buffers.png"
 SIZE = (272, 204)
 COLUMNS = 4
 LABEL_HEIGHT = 22
@@ -48,31 +48,31 @@ def main() -> None:
     dots = _with_dots(shown["direct irradiance"], view, captured.vpl_position_world, captured.vpl_flux)
     cells |= {"1,024 VPLs, over direct irradiance": dots} | shown
     cells["final"] = runtime.render(view, lights=dynamic)
-    write_png(PICTURE, np.asarray(_sheet(cells)))
+    write_png(IMAGE, np.asarray(_sheet(cells)))
 
 
 def _buffers(frame: Frame, dynamic: DynamicLights, scene_length: float) -> dict[str, np.ndarray]:
     gbuffer, rsm = frame.gbuffer, frame.rsm
     accumulation = frame.light_pre_pass.light_pass("tiles").light_accumulation
     return {
-        "G-buffer: depth": _depth(read_picture(gbuffer.depth)),
-        "G-buffer: normal": _normal(read_picture(gbuffer.normal), read_picture(gbuffer.depth)),
-        "G-buffer: albedo": _srgb(read_picture(gbuffer.albedo)),
+        "G-buffer: depth": _depth(read_image(gbuffer.depth)),
+        "G-buffer: normal": _normal(read_image(gbuffer.normal), read_image(gbuffer.depth)),
+        "G-buffer: albedo": _srgb(read_image(gbuffer.albedo)),
         f"light accumulation ({len(dynamic)} lights)": _srgb(
-            read_picture(accumulation) * dynamic.accumulation_unit * 0.15
+            read_image(accumulation) * dynamic.accumulation_unit * 0.15
         ),
-        "RSM: depth": _depth(read_picture(rsm.depth)),
-        "RSM: normal": _normal(read_picture(rsm.normal), read_picture(rsm.depth)),
-        "RSM: reflectance": _srgb(read_picture(rsm.reflectance)),
+        "RSM: depth": _depth(read_image(rsm.depth)),
+        "RSM: normal": _normal(read_image(rsm.normal), read_image(rsm.depth)),
+        "RSM: reflectance": _srgb(read_image(rsm.reflectance)),
     }
 
 
 def _irradiance(frame: Frame) -> dict[str, np.ndarray]:
     vpls, with_near_field = (
-        read_picture(picture)[..., :3] for picture in (frame.vpl_irradiance, frame.indirect_irradiance)
+        read_image(image)[..., :3] for image in (frame.vpl_irradiance, frame.indirect_irradiance)
     )
     return {
-        "direct irradiance": read_picture(frame.direct_irradiance)[..., :3],
+        "direct irradiance": read_image(frame.direct_irradiance)[..., :3],
         "indirect irradiance of the VPLs": vpls,
         "its near field, in screen space": np.maximum(with_near_field - vpls, 0.0),
     }
@@ -96,9 +96,9 @@ def _srgb(linear: np.ndarray) -> np.ndarray:
     return srgb_from_linear(np.clip(linear[..., :3].astype(np.float32), 0.0, 1.0))
 
 
-def _with_dots(picture: np.ndarray, view: View, positions: np.ndarray, flux: np.ndarray) -> np.ndarray:
+def _with_dots(image: np.ndarray, view: View, positions: np.ndarray, flux: np.ndarray) -> np.ndarray:
     """A dot at each VPL that the camera faces, in the colour of its flux; what hides it is not asked."""
-    image = Image.fromarray(picture // 2)
+    image = Image.fromarray(image // 2)
     draw = ImageDraw.Draw(image)
     to_camera = view.camera.world_to_camera
     placed = positions @ to_camera[:3, :3].T + to_camera[:3, 3]
@@ -118,11 +118,11 @@ def _sheet(cells: dict[str, np.ndarray]) -> Image.Image:
     sheet = Image.new("RGB", (COLUMNS * width, rows * height), "white")
     draw = ImageDraw.Draw(sheet)
     font = ImageFont.load_default(14)
-    for index, (name, picture) in enumerate(cells.items()):
+    for index, (name, image) in enumerate(cells.items()):
         left, top = index % COLUMNS * width, index // COLUMNS * height
-        if picture.dtype != np.uint8:
-            picture = np.round(np.clip(picture, 0.0, 1.0) * 255.0).astype(np.uint8)
-        image = Image.fromarray(picture)
+        if image.dtype != np.uint8:
+            image = np.round(np.clip(image, 0.0, 1.0) * 255.0).astype(np.uint8)
+        image = Image.fromarray(image)
         # RSM faces are square: shown whole, with white beside them.
         image.thumbnail(SIZE, Image.Resampling.BOX)
         sheet.paste(image, (left, top + LABEL_HEIGHT))

@@ -14,7 +14,7 @@ from vpltune.renderer.files.image_file import write_png
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.scene import Camera, look_at
 from vpltune.renderer.scene.views import View
-from vpltune.tuner.evaluation.comparison_image import captioned, picture_row
+from vpltune.tuner.evaluation.comparison_image import captioned, image_row
 from vpltune.tuner.evaluation.evaluate import evaluate
 from vpltune.tuner.evaluation.prepare_scene import SceneOptions, Stopwatch, prepare_scene
 from vpltune.tuner.fitting.fit_placement import fit_placement
@@ -24,17 +24,17 @@ from vpltune.tuner.surrogate.captured_view import capture_views
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 SCENE = REPOSITORY / "configs" / "scenes" / "gallery.glb"
-PICTURE = REPOSITORY / "docs" / "occluded_corner.png"
+IMAGE = REPOSITORY / "docs" / "occluded_corner.png"
 SIZE = (360, 270)
 EYE, TARGET, YFOV = np.array([1.2, 1.5, 3.9]), np.array([3.9, 1.1, 1.3]), 1.0
 
 
 def main() -> None:
     scene = read_scene(SCENE)
-    # Neither camera nor picture size is one that was fitted.
+    # Neither camera nor image size is one that was fitted.
     view = View("round the corner", "held_out", SIZE, Camera(look_at(EYE, TARGET), YFOV), scene.lights)
     references = reference_views(scene, (view,), max_samples=512)
-    pictures = {}
+    images = {}
     for visibility, variants in (("transmittance", ("default", "tuned")), ("maps", ("default",))):
         config = TunedConfig(visibility=visibility)
         prepared = prepare_scene(SCENE, SceneOptions(), config, Stopwatch(), lambda *_: None)
@@ -45,8 +45,8 @@ def main() -> None:
         for variant in variants:
             name = {"default": "untuned", "tuned": "tuned"}[variant]
             caption = captioned(f"{visibility}, {name}", evaluated.metrics[variant])
-            pictures[caption] = evaluated.irradiance[variant]
-    write_png(PICTURE, picture_row(prepared.runtime, seen, pictures, SIZE[1]))
+            images[caption] = evaluated.irradiance[variant]
+    write_png(IMAGE, image_row(prepared.runtime, seen, images, SIZE[1]))
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ from vpltune.__main__ import run
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 SCENES = REPOSITORY / "configs" / "scenes"
-PICTURE = REPOSITORY / "docs" / "report.png"
+IMAGE = REPOSITORY / "docs" / "report.png"
 SHOWN = "gallery"
 SIZE = {"width": 1180, "height": 1180}
 SCALE = 0.6
@@ -47,19 +47,17 @@ def main() -> None:
                 ),
             ]
             browser.close()
-    picture = Image.new("RGB", (sum(page.width for page in pages), pages[0].height))
+    image = Image.new("RGB", (sum(page.width for page in pages), pages[0].height))
     for index, page in enumerate(pages):
-        picture.paste(page, (index * page.width, 0))
-    picture = picture.resize(
-        (round(SCALE * picture.width), round(SCALE * picture.height)), Image.Resampling.LANCZOS
-    )
-    picture = picture.point(lambda value: min(255, (value + STEP // 2) // STEP * STEP))
-    picture.save(PICTURE, optimize=True)
-    print(f"wrote {PICTURE} ({PICTURE.stat().st_size // 1000} kB)")
+        image.paste(page, (index * page.width, 0))
+    image = image.resize((round(SCALE * image.width), round(SCALE * image.height)), Image.Resampling.LANCZOS)
+    image = image.point(lambda value: min(255, (value + STEP // 2) // STEP * STEP))
+    image.save(IMAGE, optimize=True)
+    print(f"wrote {IMAGE} ({IMAGE.stat().st_size // 1000} kB)")
 
 
 def photograph(browser: Browser, page_path: Path, scheme: str, shown: str, without: str = "") -> Image.Image:
-    """The top of a page once `shown` is there and its pictures are drawn, but for what `without` selects."""
+    """The top of a page once `shown` is there and its images are drawn, but for what `without` selects."""
     page = browser.new_context(viewport=SIZE, color_scheme=scheme).new_page()
     page.goto(page_path.as_uri())
     page.wait_for_selector(shown)

@@ -64,25 +64,25 @@ def auto_runtime(clip: CarriedLight, prior: AutoPrior | None = None, **keywords:
 
 
 def drawn_places(runtime: Runtime) -> Float64[np.ndarray, " parameters"]:
-    """Where in the unit cube the last picture's parameters lie."""
+    """Where in the unit cube the last image's parameters lie."""
     values = runtime.drawn_parameters().as_dict()
     return np.array([place_of(parameter_spec(name), values[name]) for name in AUTO_PARAMETERS])
 
 
 def write_carried_light(folder: Path) -> None:
-    """carried_light.mp4: each picture over the parameters' curves; carried_light.png: four of its frames."""
+    """carried_light.mp4: each image over the parameters' curves; carried_light.png: four of its frames."""
     clip = carried_light()
     runtime = auto_runtime(clip)
-    pictures, values = [], []
+    images, values = [], []
     for view in clip.views:
-        pictures.append(runtime.render(view))
+        images.append(runtime.render(view))
         values.append([runtime.drawn_parameters().as_dict()[name] for name in AUTO_PARAMETERS])
     curves, columns = _curves(np.array(values))
     frames = []
-    for picture, column in zip(pictures, columns, strict=True):
+    for image, column in zip(images, columns, strict=True):
         below = curves.copy()
         below[:, column] = (200, 30, 30)
-        frames.append(np.concatenate([picture, below]))
+        frames.append(np.concatenate([image, below]))
     with clip_writer(folder / "carried_light.mp4", (SIZE[0], SIZE[1] + PLOT_HEIGHT), FPS) as write:
         for frame in frames:
             write(frame)

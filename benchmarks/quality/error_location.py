@@ -59,13 +59,13 @@ def pixel_errors(view: CapturedView) -> dict[str, Float64[np.ndarray, " pixels"]
     """What each pixel of the captured image adds to relMSE, to the loss before and to the robust error."""
     (counted,) = robust_errors([view])
     chosen = np.flatnonzero(view.captured.valid.ravel())[view.fitted_pixels(view.valid.size, 0)]
-    picture, reference = (
+    image, reference = (
         image.reshape(-1, 3)[chosen].astype(np.float64)
         for image in (view.captured.indirect_irradiance, view.reference.irradiance)
     )
-    relative = squared_errors(picture, reference)
-    plain = ((picture - reference) ** 2).mean(axis=1) / reference.mean() ** 2
-    return {"relmse": relative, "before": relative + EVEN_SHARE * plain, "robust": counted.costs(picture)}
+    relative = squared_errors(image, reference)
+    plain = ((image - reference) ** 2).mean(axis=1) / reference.mean() ** 2
+    return {"relmse": relative, "before": relative + EVEN_SHARE * plain, "robust": counted.costs(image)}
 
 
 def worst_share(errors: Float64[np.ndarray, " pixels"], share: float) -> float:

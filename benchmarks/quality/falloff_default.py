@@ -26,7 +26,7 @@ SIZE = (96, 72)
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """relMSE and energy of each α against the converged picture: means over our scenes and rotations."""
+    """relMSE and energy of each α against the converged image: means over our scenes and rotations."""
     context = create_context()
     figures: dict[float, list[tuple[float, float]]] = {alpha: [] for alpha in ALPHAS}
     for index, path in enumerate(OWN_SCENES):
@@ -38,8 +38,8 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
         for alpha in ALPHAS:
             parameters = ArtistParameters(vpl_count=VPLS, falloff_footprint=alpha)
             for rotation in ROTATIONS:
-                picture = _irradiance(runtime, view, parameters, rotation)
-                figures[alpha].append((relmse(picture, converged), energy_ratio(picture, converged)))
+                image = _irradiance(runtime, view, parameters, rotation)
+                figures[alpha].append((relmse(image, converged), energy_ratio(image, converged)))
     means = {alpha: np.mean(values, axis=0) for alpha, values in figures.items()}
     progress("falloff_default", 1.0)
     return [

@@ -1,4 +1,4 @@
-"""Steadiness under motion: how much more pictures change from frame to frame than the light does.
+"""Steadiness under motion: how much more images change from frame to frame than the light does.
 
 A spot is swept through the gallery, and a sun stands over a courtyard whose bounds change because something
 rises out of it. The figure is the mean absolute change of indirect irradiance from frame to frame, of the
@@ -100,11 +100,11 @@ def irradiance(
     runtime: Runtime, clip: Clip, frames: range | tuple[int, ...]
 ) -> Float32[np.ndarray, "frames height width 3"]:
     """Indirect irradiance of some frames."""
-    pictures = []
+    images = []
     for frame in frames:
         _set_pose(runtime, clip, frame)
-        pictures.append(runtime.render(clip.views[frame], "irradiance"))
-    return np.stack(pictures)
+        images.append(runtime.render(clip.views[frame], "irradiance"))
+    return np.stack(images)
 
 
 def reference_steps() -> list[int]:
@@ -157,8 +157,8 @@ def _runtime(clip: Clip, options: RuntimeOptions, factor: int) -> Runtime:
     return Runtime(clip.scene, config, options, rsm_resolution=resolution)
 
 
-def _changes(pictures: Float32[np.ndarray, "frames height width 3"]) -> Float32[np.ndarray, " steps"]:
-    return np.abs(np.diff(pictures, axis=0)).mean(axis=(1, 2, 3)) / pictures.mean()
+def _changes(images: Float32[np.ndarray, "frames height width 3"]) -> Float32[np.ndarray, " steps"]:
+    return np.abs(np.diff(images, axis=0)).mean(axis=(1, 2, 3)) / images.mean()
 
 
 def write_plot(path: Path, changes: dict[str, dict[str, np.ndarray]]) -> None:
@@ -206,7 +206,7 @@ def _set_pose(runtime: Runtime, clip: Clip, frame: int) -> None:
 
 
 def write_clip(path: Path, clip: Clip, config: TunedConfig, size: tuple[int, int] = (480, 360)) -> None:
-    """A clip's final pictures."""
+    """A clip's final images."""
     runtime = Runtime(clip.scene, config)
     exposure = None
     with clip_writer(path, size, 30.0) as write:

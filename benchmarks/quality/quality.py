@@ -1,6 +1,6 @@
 """How close default, tuned and ceiling come to the path tracer: every scene, on fitted and held-out views.
 
-Each view has a light position of its own. The pictures and all figures by view go to out/quality/<scene>.
+Each view has a light position of its own. The images and all figures by view go to out/quality/<scene>.
 """
 
 from collections.abc import Callable

@@ -208,5 +208,5 @@ def _seen_by_depth(view: CapturedView, texels: MapTexels) -> list[np.ndarray]:
 
 
 def _error(view: CapturedView, visibility: np.ndarray) -> float:
-    picture = surrogate_irradiance(view, DEFAULT, jnp.asarray(visibility))
-    return relmse(picture[view.valid], view.reference.irradiance[view.valid])
+    image = surrogate_irradiance(view, DEFAULT, jnp.asarray(visibility))
+    return relmse(image[view.valid], view.reference.irradiance[view.valid])

@@ -157,9 +157,9 @@ def _figures(
         metrics = []
         for view in views:
             if view.view.split == split:
-                picture = irradiance(view)
-                radiances = view.runtime_radiance(picture), view.reference_radiance()
-                metrics.append(view_metrics(picture, view.reference.irradiance, *radiances, view.valid))
+                image = irradiance(view)
+                radiances = view.runtime_radiance(image), view.reference_radiance()
+                metrics.append(view_metrics(image, view.reference.irradiance, *radiances, view.valid))
         found[split] = asdict(mean_metrics(metrics))
     return found
 

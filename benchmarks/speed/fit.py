@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import REPOSITORY
 from vpltune.tuner.metrics.relative_squared_error import target_of, weighted_squared_error
-from vpltune.tuner.surrogate.reduced_gather import ReducedGather, reduce_gather, reduced_picture
+from vpltune.tuner.surrogate.reduced_gather import ReducedGather, reduce_gather, reduced_image
 from vpltune.tuner.surrogate.tabulated_gather import gather_tabulated, tabulate_gather
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
 from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, gather_pairwise
@@ -69,7 +69,7 @@ def _step_milliseconds() -> tuple[float, float]:
     target = target_of(truth, truth)
 
     def reduced_loss(parameters: FalloffParameters, reduced: ReducedGather) -> jax.Array:
-        return jnp.sum((reduced_picture(reduced, parameters) - reduced.target) ** 2) + reduced.offset
+        return jnp.sum((reduced_image(reduced, parameters) - reduced.target) ** 2) + reduced.offset
 
     def pairwise_loss(parameters: FalloffParameters, pair: tuple[Receivers, VirtualPointLights]) -> jax.Array:
         return weighted_squared_error(gather_pairwise(*pair, parameters), target)

@@ -3,7 +3,7 @@
 The peer is Babylon.js 9.34's GIRSM (global illumination by reflective shadow maps), measured in a headless
 browser on the same two views with a hard-edged spot of 120 degrees: its relMSE of indirect irradiance at its
 defaults, and at the best of what was tried on that very scene, radius and intensity searched by hand or
-intensity fitted. A black picture scores 0.88 and 0.83; what was tuned on one scene scores 0.86 and 0.74 on
+intensity fitted. A black image scores 0.88 and 0.83; what was tuned on one scene scores 0.86 and 0.74 on
 the other.
 """
 

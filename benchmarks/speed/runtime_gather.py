@@ -12,7 +12,7 @@ from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import present_scenes
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig, Visibility
-from vpltune.renderer.frame.capture import read_picture
+from vpltune.renderer.frame.capture import read_image
 from vpltune.renderer.frame.frame import Frame, frame_light_records
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
@@ -143,12 +143,12 @@ class _FullGather:
     """What an interleaved gather is measured against."""
 
     milliseconds: float
-    picture: np.ndarray
+    image: np.ndarray
 
 
 def _full_gather(context: moderngl.Context, drawn: _Drawn, repeats: int) -> _FullGather:
     milliseconds = _gather_milliseconds(context, drawn, repeats)
-    return _FullGather(milliseconds, read_picture(drawn.frame.vpl_irradiance))
+    return _FullGather(milliseconds, read_image(drawn.frame.vpl_irradiance))
 
 
 def _interleaved_row(
@@ -156,7 +156,7 @@ def _interleaved_row(
 ) -> Row:
     drawn = scene.drawn(SIZE, RuntimeOptions(interleave=4), visibility)
     milliseconds = _gather_milliseconds(context, drawn, repeats=3)
-    error = _relative_error(read_picture(drawn.frame.vpl_irradiance), full.picture)
+    error = _relative_error(read_image(drawn.frame.vpl_irradiance), full.image)
     maps = "with visibility maps" if visibility == "maps" else "without maps"
     return Row(name, milliseconds, "ms", f"gather_full, {maps}; relMSE {error:.2g}", full.milliseconds)
 
@@ -197,8 +197,8 @@ def _indirect_milliseconds(context: moderngl.Context, drawn: _Drawn) -> float:
     return _milliseconds(context, indirect_path, repeats=2)
 
 
-def _relative_error(picture: np.ndarray, reference: np.ndarray) -> float:
+def _relative_error(image: np.ndarray, reference: np.ndarray) -> float:
     """relMSE of irradiance (vpltune.tuner.metrics.view_metrics) where a surface is seen."""
     seen = reference[..., 3] > 0.0
-    y, r = picture[seen][:, :3].astype(np.float64), reference[seen][:, :3].astype(np.float64)
+    y, r = image[seen][:, :3].astype(np.float64), reference[seen][:, :3].astype(np.float64)
     return float(np.mean((y - r) ** 2 / (r**2 + 0.01 * r.mean() ** 2)))

@@ -71,7 +71,7 @@ def _moving_lights(scene: Scene, view: View, count: int) -> BouncingLights:
 def _per_draw_milliseconds(
     context: moderngl.Context, frame: Frame, view: View, moving: BouncingLights
 ) -> float:
-    """Milliseconds for each light, drawn over the whole picture by itself."""
+    """Milliseconds for each light, drawn over the whole image by itself."""
     lights, buffer = DynamicLights(moving.records), DynamicLightBuffer(context)
     buffer.upload(lights)
     light_pass, camera = LightPerDrawPass(context, frame.gbuffer), frame.camera(view)

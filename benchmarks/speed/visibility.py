@@ -1,6 +1,6 @@
 """What visibility maps cost: maps and gather against the gather without, pass by pass.
 
-The picture is `SIZE` with 4×4 interleaving, as `vpltune render --interleave 4` draws it. Passes are timed one
+The image is `SIZE` with 4×4 interleaving, as `vpltune render --interleave 4` draws it. Passes are timed one
 by one, by GPU timers where they tell the truth and by the finished wall clock where they do not; frames with
 and without maps are drawn in turn, so that a busy machine is busy for both.
 """

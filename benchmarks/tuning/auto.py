@@ -1,11 +1,11 @@
 """How far `auto` comes on scenes that its prior has not seen: against the defaults and each scene's own fit.
 
 Scenes are generated ones and those of others, as `vpltune train-prior` takes them; for each, the prior is one
-that was trained without it, and runtime pictures are measured against the path tracer. What each scene came
+that was trained without it, and runtime images are measured against the path tracer. What each scene came
 to goes to out/auto/scenes.json.
 
 `python -m benchmarks.tuning.auto FOLDER` writes the clip of a light that is carried from a small room into a hall,
-with the parameters plotted under the picture.
+with the parameters plotted under the image.
 """
 
 import sys
@@ -67,7 +67,7 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
     with create_context() as context:
         measured = []
         for index, each in enumerate(scenes):
-            progress("runtime pictures", index / len(scenes))
+            progress("runtime images", index / len(scenes))
             measured.append(_measured(context, learnt, index, sources[each.name]()))
         changes = [
             _scale_change(context, learnt.unseen[index], sources[scenes[index].name]())
@@ -169,18 +169,16 @@ def _mean_loss(table: LossTable, point: np.ndarray) -> jax.Array:
 
 
 def _scale_change(context: moderngl.Context, prior: AutoPrior, scene: Scene) -> float:
-    """The largest relative RMSE between a picture drawn with `auto` and the same at another scale."""
+    """The largest relative RMSE between an image drawn with `auto` and the same at another scale."""
     config = TunedConfig(ArtistParameters(vpl_count=VPL_COUNT), visibility="maps", auto=prior)
     (view,) = prior_views(scene)[:1]
 
-    def picture(factor: float) -> np.ndarray:
+    def image(factor: float) -> np.ndarray:
         runtime = Runtime(scaled(scene, factor), config, context=context, rsm_resolution=RSM_RESOLUTION)
         return runtime.render_radiance(scaled_view(view, factor))
 
-    plain = picture(1.0)
-    return max(
-        float(np.sqrt(np.mean((picture(factor) - plain) ** 2) / np.mean(plain**2))) for factor in SCALES
-    )
+    plain = image(1.0)
+    return max(float(np.sqrt(np.mean((image(factor) - plain) ** 2) / np.mean(plain**2))) for factor in SCALES)
 
 
 if __name__ == "__main__":

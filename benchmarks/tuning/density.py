@@ -28,12 +28,12 @@ from vpltune.renderer.scene.placement import resolve_camera_and_lights
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene, SceneOptions, Stopwatch, prepare_scene
 from vpltune.tuner.fitting.fit_density import (
-    RELAXATION,
+    LLOYD_ITERATIONS,
     fit_density,
     rotated_views,
     rotation_errors,
     table_rotations,
-    with_cells,
+    with_discs,
 )
 from vpltune.tuner.fitting.fit_placement import PlacementFit, fit_placement
 from vpltune.tuner.surrogate.captured_view import CapturedView
@@ -60,19 +60,19 @@ COST_TURNS = 3
 COST_PASSES = (
     "vpl_importance",
     "virtual_point_lights",
-    "vpl_cells",
+    "clustered_discs",
     "vpl_visibility_maps",
     "vpl_gather",
     "interleaved_filter",
 )
 SLOPE_STEPS = 20
 """Along η, at each of which the sign of the measured slope is compared with the smooth trend's."""
-RELAXATIONS = (1, 4, 16)
+LLOYD_ITERATIONS_TRIED = (1, 4, 16)
 """Steps to measure beside those that fits take."""
 _UNFITTED = {
     "uniform": ArtistParameters(density_exponent=0.0),
     "default": ArtistParameters(),
-    "cells": with_cells(ArtistParameters()),
+    "cells": with_discs(ArtistParameters()),
 }
 VARIANTS = (*_UNFITTED, "fitted")
 
@@ -124,7 +124,7 @@ def curve_rows(curves: Sequence[SceneCurves]) -> list[Row]:
                 float(DEFAULT_COUNT),
             ),
             Row(
-                f"tuned_32_over_cells_256.{scene.name}",
+                f"tuned_32_over_discs_256.{scene.name}",
                 scene.fitted[FITTED_COUNT],
                 "relMSE",
                 f"default but for its cells at {DEFAULT_COUNT} VPLs",
@@ -186,14 +186,14 @@ def measured_curves(name: str, path: Path, progress: Progress) -> SceneCurves:
 
 
 def cost_rows(path: Path, progress: Progress) -> list[Row]:
-    """What VPLs cost from placement to picture, frames drawn in turn: with cells, against the default.
+    """What VPLs cost from placement to image, frames drawn in turn: with cells, against the default.
 
     The rows `tuned_32_a_pixel_…` are to be read beside these.
     """
     scene = read_scene(path)
     camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
     view = View("cost", "fitted", COST_SIZE, camera, lights)
-    cells = with_cells(ArtistParameters())
+    cells = with_discs(ArtistParameters())
     drawn = {
         "32": (replace(cells, vpl_count=FITTED_COUNT), 1),
         **{f"32_a_pixel_{s}x{s}": (replace(cells, vpl_count=FITTED_COUNT * s**2), s) for s in INTERLEAVES},
@@ -222,18 +222,18 @@ def cost_rows(path: Path, progress: Progress) -> list[Row]:
 
 def relaxation_rows(names: Sequence[str], present: Mapping[str, Path], progress: Progress) -> list[Row]:
     """Unfitted cells after more and fewer steps, in the geometric mean over scenes."""
-    logs: dict[int, list[float]] = {steps: [] for steps in (RELAXATION, *RELAXATIONS)}
+    logs: dict[int, list[float]] = {steps: [] for steps in (LLOYD_ITERATIONS, *LLOYD_ITERATIONS_TRIED)}
     for name in names:
         progress(f"{name}: relaxation", 0.0)
         prepared = _prepared(present[name])
         for steps, found in logs.items():
-            cells = replace(with_cells(ArtistParameters(vpl_count=FITTED_COUNT)), density_relaxation=steps)
+            cells = replace(with_discs(ArtistParameters(vpl_count=FITTED_COUNT)), lloyd_iterations=steps)
             found.append(np.log(_error(prepared.runtime, prepared.views, cells)))
     error = {steps: float(np.exp(np.mean(found))) for steps, found in logs.items()}
-    against = f"after {RELAXATION} steps, {FITTED_COUNT} cells"
+    against = f"after {LLOYD_ITERATIONS} steps, {FITTED_COUNT} cells"
     return [
-        Row(f"relaxation_{steps}", error[steps], "relMSE", against, error[RELAXATION])
-        for steps in RELAXATIONS
+        Row(f"relaxation_{steps}", error[steps], "relMSE", against, error[LLOYD_ITERATIONS])
+        for steps in LLOYD_ITERATIONS_TRIED
     ]
 
 

@@ -1,6 +1,6 @@
 """Small fits with a known answer: boxes lit by VPLs, with misfit and noise as real ones have.
 
-The picture of each view is the full gather's at the planted parameters, times a smooth field exp(s·g) that no
+The image of each view is the full gather's at the planted parameters, times a smooth field exp(s·g) that no
 parameter can follow (g Gaussian with a random correlation length, the same in all channels), with independent
 noise in each half of the reference. What is planted is then what the views tell, give or take what the
 intervals must cover.
@@ -41,7 +41,7 @@ def planted_problem(seed: int) -> PlantedProblem:
     planted = ArtistParameters(
         intensity=float(np.exp(random.uniform(np.log(0.5), np.log(2.0)))),
         falloff_footprint=float(np.exp(random.uniform(np.log(0.3), np.log(3.0)))),
-        falloff_transmittance=float(random.uniform(0.0, 1.5)),
+        extinction_coefficient=float(random.uniform(0.0, 1.5)),
     )
     half_size = random.uniform(0.6, 1.6, 3)
     misfit = random.uniform(0.02, 0.2)
@@ -59,10 +59,10 @@ def _view(
 ) -> FitView:
     receivers = _seen(random, half_size)
     vpls = _lit_patch(random, half_size)
-    picture = np.asarray(_gather(receivers, vpls, FalloffParameters.of(planted)))
-    picture = picture * np.exp(misfit * _smooth_field(random).reshape(-1, 1))
+    image = np.asarray(_gather(receivers, vpls, FalloffParameters.of(planted)))
+    image = image * np.exp(misfit * _smooth_field(random).reshape(-1, 1))
     halves = [
-        np.maximum(picture * (1.0 + noise * random.standard_normal(picture.shape)), 0.0).astype(np.float32)
+        np.maximum(image * (1.0 + noise * random.standard_normal(image.shape)), 0.0).astype(np.float32)
         for _ in range(2)
     ]
     pixels = np.arange(SIZE[0] * SIZE[1])

@@ -59,7 +59,7 @@ from vpltune.tuner.fitting.fit_density import (
     fit_density,
     rotated_views,
     table_rotations,
-    with_cells,
+    with_discs,
 )
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
@@ -122,8 +122,8 @@ def measure_scene(name: str, path: Path) -> dict[str, Any]:
     held_out = RuntimeLoss(problem.runtime, problem.views, unseen, problem.base)
     losses = {
         "default": problem.loss(problem.start),
-        "bgfx_formula": problem.loss.of_pictures(_formula(problem, bgfx_irradiance)),
-        "babylon_formula": problem.loss.of_pictures(_formula(problem, babylon_irradiance)),
+        "bgfx_formula": problem.loss.of_images(_formula(problem, bgfx_irradiance)),
+        "babylon_formula": problem.loss.of_images(_formula(problem, babylon_irradiance)),
     }
     document = {
         "scene": name,
@@ -157,7 +157,7 @@ class _Problem:
 
 
 def _problem(path: Path) -> _Problem:
-    base = with_cells(ArtistParameters(vpl_count=VPLS))
+    base = with_discs(ArtistParameters(vpl_count=VPLS))
     config = TunedConfig(base, visibility="maps")
     options = SceneOptions(size=SIZE, views=VIEWS)
     prepared = prepare_scene(path, options, config, Stopwatch(), lambda stage, share: None)
@@ -232,13 +232,13 @@ def _formula(
 ) -> Callable[[CapturedView, Rotation], np.ndarray]:
     captured = iter(problem.captured(problem.base))
 
-    def picture(view: CapturedView, rotation: Rotation) -> np.ndarray:
+    def image(view: CapturedView, rotation: Rotation) -> np.ndarray:
         frame = next(captured).captured
         drawn = np.zeros((*frame.valid.shape, 3), np.float32)
         drawn[frame.valid] = irradiance(frame)
         return drawn
 
-    return picture
+    return image
 
 
 def _told(trace: Trace, held_out: RuntimeLoss) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
-from vpltune.renderer.frame.capture import CapturedFrame, read_picture
+from vpltune.renderer.frame.capture import CapturedFrame, read_image
 from vpltune.renderer.frame.frame import Frame
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.views import View
@@ -97,21 +97,21 @@ class RuntimeLoss:
 
     def __call__(self, point: Point) -> float:
         self._runtime.parameters = SPACE.parameters(point, self._base)
-        return self.of_pictures(self._drawn)
+        return self.of_images(self._drawn)
 
-    def of_pictures(self, picture_of: Callable[[CapturedView, Rotation], np.ndarray]) -> float:
-        """The loss of any pictures, [height, width, 3] each."""
+    def of_images(self, image_of: Callable[[CapturedView, Rotation], np.ndarray]) -> float:
+        """The loss of any images, [height, width, 3] each."""
         losses = []
         for index, (view, (half_a, half_b, weight)) in enumerate(
             zip(self._views, self._targets, strict=True)
         ):
             for rotation in view_rotations(self._rotations, index):
-                values = picture_of(view, rotation)[view.valid].astype(np.float64)
+                values = image_of(view, rotation)[view.valid].astype(np.float64)
                 losses.append(float((weight * (values - half_a) * (values - half_b)).sum()))
         return float(np.mean(losses))
 
     def _drawn(self, view: CapturedView, rotation: Rotation) -> np.ndarray:
-        return read_picture(self._runtime._draw(view.view, rotation).indirect_irradiance)[..., :3]
+        return read_image(self._runtime._draw(view.view, rotation).indirect_irradiance)[..., :3]
 
 
 class SurrogateLoss:

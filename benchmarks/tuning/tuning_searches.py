@@ -18,7 +18,7 @@ GRID_PASSES = 6
 """As XeGTAO's auto-tune: ten steps a setting, six passes, each pass over a narrower range about the best."""
 GRID_NARROWING = 0.5
 DIFFERENCE = 1e-3
-"""Of the cube's side: pictures are float32, and their loss is good to about 1e-6."""
+"""Of the cube's side: images are float32, and their loss is good to about 1e-6."""
 FIRST_SIGMA = 0.2
 
 

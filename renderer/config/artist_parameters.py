@@ -13,6 +13,7 @@ from typing import Any, Literal
 from vpltune.renderer.errors import InputError
 
 Scale = Literal["linear", "log"]
+Part = Literal["parameters", "quality"]
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,8 @@ class ParameterSpec:
     fitted: bool
     """Whether `vpltune fit` adjusts it."""
     whole_number: bool = False
+    part: Part = "parameters"
+    """The part of a config file that holds it."""
 
     def __post_init__(self) -> None:
         numbers = (self.low, self.default, self.high)
@@ -102,7 +105,7 @@ ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
         fitted=True,
     ),
     ParameterSpec(
-        name="falloff_transmittance",
+        name="extinction_coefficient",
         symbol="κ",
         default=0.0,
         low=0.0,
@@ -169,17 +172,18 @@ ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
         fitted=False,
     ),
     ParameterSpec(
-        name="density_relaxation",
+        name="lloyd_iterations",
         symbol="λ",
         default=0,
         low=0,
         high=16,
         scale="linear",
-        unit="steps",
+        unit="iterations",
         meaning=(
-            "0 draws VPLs as points; else each is a disc with the light of a cell, and moves so often to its "
-            "middle; more than 4,096 VPLs are always points"
+            "Lloyd iterations that cluster the VPLs: 0 draws them as points, more makes each a clustered disc "
+            "light; more than 4,096 VPLs are always points"
         ),
+        part="quality",
         fitted=False,
         whole_number=True,
     ),
@@ -226,13 +230,13 @@ class ArtistParameters:
 
     intensity: float = float(_SPECS["intensity"].default)
     falloff_footprint: float = float(_SPECS["falloff_footprint"].default)
-    falloff_transmittance: float = float(_SPECS["falloff_transmittance"].default)
+    extinction_coefficient: float = float(_SPECS["extinction_coefficient"].default)
     visibility_bias: float = float(_SPECS["visibility_bias"].default)
     visibility_softness: float = float(_SPECS["visibility_softness"].default)
     vpl_count: int = int(_SPECS["vpl_count"].default)
     density_exponent: float = float(_SPECS["density_exponent"].default)
     density_importance: float = float(_SPECS["density_importance"].default)
-    density_relaxation: int = int(_SPECS["density_relaxation"].default)
+    lloyd_iterations: int = int(_SPECS["lloyd_iterations"].default)
     screen_space_radius: float = float(_SPECS["screen_space_radius"].default)
     screen_space_strength: float = float(_SPECS["screen_space_strength"].default)
 
@@ -271,5 +275,5 @@ def placement(parameters: ArtistParameters) -> Placement:
         parameters.vpl_count,
         parameters.density_exponent,
         parameters.density_importance,
-        parameters.density_relaxation,
+        parameters.lloyd_iterations,
     )

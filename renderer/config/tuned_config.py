@@ -1,14 +1,23 @@
-"""The config file: what the tuner writes and the runtime reads.
+"""The config file: what the tuner writes, and all that decides an image beside scene and view.
 
-    {"format": "vpltune", "version": 1, "parameters": {"intensity": 1.0, ...}, "provenance": {...}}
+    {"format": "vpltune", "version": 2, "visibility": "maps", "quality": {"interleave": 4, ...},
+     "parameters": {"intensity": 1.0, ...}, "fit": {"status": "improved", ...}, "checksum": "sha256:..."}
 
-`parameters` holds every name of the table in `renderer.config.artist_parameters` and nothing else.
-`visibility` ("none", "transmittance", "maps") says what stands for occluders; a file without it means
-"maps". `auto` is optional: a learnt prior (`renderer.config.auto_prior`) that sets some of the parameters
-anew in every frame; it goes with "maps". `provenance` is optional, says where the numbers come from, and is
-never acted on.
+| key | meaning |
+|---|---|
+| `parameters` | every name of the table in `renderer.config.artist_parameters`, and no other |
+| `quality` | settings that trade quality for frame time (`renderer.config.quality`); optional |
+| `visibility` | what occludes VPLs: `maps`, or `transmittance` alone; optional, `maps` by default |
+| `auto` | a learnt prior that sets some parameters in every frame (`renderer.config.auto_prior`); optional |
+| `fit` | how the fit that wrote the file ended; optional |
+| `light` | reserved for settings of the scene's light; kept and not acted on; optional |
+| `provenance` | where the numbers come from; kept and not acted on; optional |
+| `checksum` | SHA-256 of all the rest; optional, but a wrong one is refused |
+
+Version 1 is read too (`renderer.config.config_versions`).
 """
 
+import hashlib
 import json
 import sys
 from collections.abc import Mapping
@@ -18,40 +27,60 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
-from vpltune.renderer.config.auto_prior import AutoPrior, auto_schema
+from vpltune.renderer.config.auto_prior import AutoPrior
+from vpltune.renderer.config.config_versions import brought_forward
 from vpltune.renderer.config.gltf_extras import GLTF_SUFFIXES, read_gltf_extras
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
+from vpltune.renderer.files.strict_json import DuplicateKeyError, unique_keys
 
 FORMAT = "vpltune"
-VERSION = 1
+VERSION = 2
 DEFAULT_CONFIG_NAME = "default"
 AUTO_CONFIG_NAME = "auto"
 PRESETS = (DEFAULT_CONFIG_NAME, AUTO_CONFIG_NAME)
 # A real file is about 1 kB; the bound keeps a wrong path (a scene, a device) from being read whole.
 MAXIMUM_FILE_BYTES = 1 << 20
 LARGEST_NUMBER = sys.float_info.max
+KEYS = (
+    "format", "version", "visibility", "quality", "parameters", "auto", "light", "fit", "provenance", "checksum"
+)  # fmt: skip
 
-Visibility = Literal["none", "transmittance", "maps"]
+Visibility = Literal["transmittance", "maps"]
 VISIBILITIES: tuple[Visibility, ...] = get_args(Visibility)
 DEFAULT_VISIBILITY: Visibility = "maps"
 
 Provenance = Mapping[str, str | int | float]
+_QUALITY_PARAMETERS = tuple(spec.name for spec in ARTIST_PARAMETERS if spec.part == "quality")
+_CHECKSUM_PREFIX = "sha256:"
+
+
+@dataclass(frozen=True)
+class FitNote:
+    """How the fit that wrote a config ended."""
+
+    status: str
+    """`improved`, `kept`, `unlit` or `doubtful`."""
+    sentence: str = ""
 
 
 @dataclass(frozen=True)
 class TunedConfig:
-    """Parameters, and where they come from."""
+    """All that decides an image beside the scene and the view."""
 
     parameters: ArtistParameters = field(default_factory=ArtistParameters)
     provenance: Provenance = field(default_factory=dict)
     """Free-form names to strings or finite numbers."""
     visibility: Visibility = DEFAULT_VISIBILITY
-    """What stands for occluders between VPLs and surfaces: nothing, the mean transmittance exp(−κ·d/L), or a
-    small map of what each VPL sees, with the transmittance for what the maps cannot resolve."""
-
+    """What occludes VPLs: a small map of what each VPL sees, with the mean transmittance exp(−κ·d/L) for what
+    maps cannot resolve; or that transmittance alone."""
     auto: AutoPrior | None = None
-    """What sets some of the parameters on the GPU, frame by frame; needs the visibility "maps"."""
+    """Sets some of the parameters on the GPU, frame by frame; needs the visibility `maps`."""
+    quality: Quality = field(default_factory=Quality)
+    fit: FitNote | None = None
+    light: Mapping[str, Any] = field(default_factory=dict)
+    """Reserved; kept as it was read."""
 
     def seen_by(self, visibility: Visibility | None) -> "TunedConfig":
         """The same config with another visibility; None keeps its own.
@@ -65,22 +94,27 @@ class TunedConfig:
             )
         return self if visibility is None else replace(self, visibility=visibility)
 
+    def with_parameters(self, parameters: ArtistParameters) -> "TunedConfig":
+        """The same config with these parameters, which replace its prior too."""
+        return replace(self, parameters=parameters, auto=None)
 
-def read_config(source: str | Path) -> TunedConfig:
+
+def read_config(source: str | Path, *, check: bool = True) -> TunedConfig:
     """Read a config file, or for the words "default" and "auto" the preset in configs/.
 
-    A .gltf or .glb holds a config where `vpltune export --to gltf` has put one into its extras.
+    A .gltf or .glb holds a config where `vpltune export --to gltf` has put one into its extras. `check` False
+    accepts a wrong checksum.
 
     Raises:
-        InputError: the file cannot be read, is not JSON, has another format or a later version,
-            repeats, lacks or adds a key, or holds a value that is not finite and in range.
+        InputError: the file cannot be read, is not JSON, has another format or a later version, repeats,
+            lacks or adds a key, holds a value that is not finite and in range, or its checksum is wrong.
     """
     if str(source) in PRESETS:
         text = files("vpltune.configs").joinpath(f"{source}.json").read_text(encoding="utf-8")
-        return parse_config(text, f"configs/{source}.json")
+        return parse_config(text, f"configs/{source}.json", check=check)
     path = Path(source)
     if path.suffix.lower() in GLTF_SUFFIXES:
-        return parse_config(json.dumps(read_gltf_extras(path)), str(path))
+        return parse_config(json.dumps(read_gltf_extras(path)), str(path), check=check)
     try:
         with path.open("rb") as file:
             content = file.read(MAXIMUM_FILE_BYTES + 1)
@@ -92,30 +126,27 @@ def read_config(source: str | Path) -> TunedConfig:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not UTF-8 text (byte {error.start})") from error
-    return parse_config(text, str(path))
+    return parse_config(text, str(path), check=check)
 
 
-def parse_config(text: str, where: str) -> TunedConfig:
+def parse_config(text: str, where: str, *, check: bool = True) -> TunedConfig:
     """The config that `text` holds; `where` names its origin in errors. Raises as `read_config`."""
     try:
-        document = json.loads(text, object_pairs_hook=_refuse_duplicates)
-    except _DuplicateKeyError as error:
-        raise InputError(f"{where}: key {str(error)!r:.60} stands there twice") from error
+        document = json.loads(text, object_pairs_hook=unique_keys)
+    except DuplicateKeyError as error:
+        raise InputError(f"{where}: key {str(error)!r:.60} appears twice") from error
     # RecursionError: deep nesting; ValueError: bad syntax, or an integer of more than 4300 digits.
     except (ValueError, RecursionError) as error:
         raise InputError(f"{where}: not JSON ({error})") from error
     if not isinstance(document, dict):
         raise InputError(f"{where}: must be a JSON object, got {type(document).__name__}")
     _check_header(document, where)
-    parameters = document["parameters"]
-    if not isinstance(parameters, dict):
-        raise InputError(f"{where}: key 'parameters' must be an object, got {type(parameters).__name__}")
-    return TunedConfig(
-        parameters=ArtistParameters.validated(parameters, f"{where}: parameters"),
-        provenance=_checked_provenance(document.get("provenance", {}), where),
-        visibility=_checked_visibility(document.get("visibility", DEFAULT_VISIBILITY), where),
-        auto=_checked_auto(document, where),
-    )
+    if document["version"] < VERSION:
+        document = brought_forward(document, where)
+    config = _config(document, where)
+    if check and "checksum" in document:
+        _check_checksum(document["checksum"], config, where)
+    return config
 
 
 def write_config(path: Path, config: TunedConfig) -> None:
@@ -128,90 +159,69 @@ def write_config(path: Path, config: TunedConfig) -> None:
 
 
 def config_text(config: TunedConfig) -> str:
-    """The file's text: keys in the table's order, numbers with all their digits.
+    """The file's text: keys in the table's order, numbers with all their digits, and the checksum.
 
     Raises:
         InputError: a value is out of range.
     """
-    parameters = ArtistParameters.validated(config.parameters.as_dict())
-    document: dict[str, Any] = {
-        "format": FORMAT,
-        "version": VERSION,
-        "visibility": _checked_visibility(config.visibility, "config"),
-        "parameters": parameters.as_dict(),
-    }
-    if config.auto is not None:
-        document["auto"] = config.auto.as_dict()
-        _checked_auto(document, "config")
-    if config.provenance:
-        document["provenance"] = _checked_provenance(dict(config.provenance), "config")
+    document = _document(config)
+    _config(json.loads(json.dumps(document)), "config")
+    document["checksum"] = _checksum(document)
     # Escaped to ASCII: a provenance may hold a file name that is not valid Unicode.
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
-def config_schema() -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of the file, made from the parameter table."""
-    properties = {
-        spec.name: {
-            "title": spec.symbol,
-            "description": f"{spec.meaning} [{spec.unit}]",
-            "type": "integer" if spec.whole_number else "number",
-            "minimum": spec.low,
-            "maximum": spec.high,
-            # Says `minimum` once more, the other way round. NaN is no JSON, but parsers let it pass, and of
-            # comparisons with it none fails: turned round, none succeeds.
-            "not": {"exclusiveMaximum": spec.low},
-            "default": spec.default,
-        }
-        for spec in ARTIST_PARAMETERS
+def _document(config: TunedConfig) -> dict[str, Any]:
+    """The file's content without its checksum; values are not checked."""
+    parameters = config.parameters.as_dict()
+    in_quality = {name: parameters.pop(name) for name in _QUALITY_PARAMETERS}
+    document: dict[str, Any] = {
+        "format": FORMAT,
+        "version": VERSION,
+        "visibility": config.visibility,
+        "quality": {**config.quality.as_dict(), **in_quality},
+        "parameters": parameters,
     }
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "VPLtune config",
-        "description": "Tuned parameters of one-bounce indirect light; none has a world unit.",
-        "type": "object",
-        "required": ["format", "version", "parameters"],
-        "additionalProperties": False,
-        "properties": {
-            "format": {"const": FORMAT},
-            "version": {"const": VERSION},
-            "parameters": {
-                "type": "object",
-                "required": list(properties),
-                "additionalProperties": False,
-                "properties": properties,
-            },
-            "visibility": {
-                "description": "What stands for occluders between VPLs and surfaces.",
-                "enum": list(VISIBILITIES),
-                "default": DEFAULT_VISIBILITY,
-            },
-            "auto": auto_schema(),
-            "provenance": {
-                "description": "Where the numbers come from; never acted on.",
-                "type": "object",
-                "additionalProperties": {
-                    "type": ["string", "number"],
-                    "minimum": -LARGEST_NUMBER,
-                    "maximum": LARGEST_NUMBER,
-                    "not": {"type": "number", "exclusiveMaximum": -LARGEST_NUMBER},
-                },
-            },
-        },
-    }
+    if config.auto is not None:
+        document["auto"] = config.auto.as_dict()
+    if config.light:
+        document["light"] = dict(config.light)
+    if config.fit is not None:
+        document["fit"] = {"status": config.fit.status, "sentence": config.fit.sentence}
+    if config.provenance:
+        document["provenance"] = dict(config.provenance)
+    return document
 
 
-class _DuplicateKeyError(ValueError):
-    """A key stands twice in one JSON object; the standard reader would keep the last and say nothing."""
+def _config(document: dict[str, Any], where: str) -> TunedConfig:
+    """The config of a document of the present version, checked but for its checksum."""
+    for key in document:
+        if key not in KEYS:
+            raise InputError(f"{where}: unknown key {key!r:.60}; known are {', '.join(KEYS)}")
+    parameters = _object(document, "parameters", where)
+    quality = dict(_object(document, "quality", where))
+    for name in _QUALITY_PARAMETERS:
+        if name in parameters:
+            raise InputError(f"{where}: parameters: unknown key '{name}'; it belongs in 'quality'")
+        default = next(spec.default for spec in ARTIST_PARAMETERS if spec.name == name)
+        parameters = {**parameters, name: quality.pop(name, default)}
+    fit = _object(document, "fit", where) if "fit" in document else None
+    return TunedConfig(
+        parameters=_checked_parameters(parameters, where),
+        provenance=_checked_provenance(document.get("provenance", {}), where),
+        visibility=_checked_visibility(document.get("visibility", DEFAULT_VISIBILITY), where),
+        auto=_checked_auto(document, parameters["lloyd_iterations"], where),
+        quality=Quality.validated(quality, f"{where}: quality"),
+        fit=None if fit is None else _checked_fit(fit, where),
+        light=_object(document, "light", where),
+    )
 
 
-def _refuse_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    members: dict[str, Any] = {}
-    for key, value in pairs:
-        if key in members:
-            raise _DuplicateKeyError(key)
-        members[key] = value
-    return members
+def _checked_parameters(parameters: Mapping[str, Any], where: str) -> ArtistParameters:
+    for spec in ARTIST_PARAMETERS:
+        if spec.part == "quality":
+            spec.checked(parameters[spec.name], f"{where}: quality")
+    return ArtistParameters.validated(parameters, f"{where}: parameters")
 
 
 def _check_header(document: dict[str, Any], where: str) -> None:
@@ -225,10 +235,13 @@ def _check_header(document: dict[str, Any], where: str) -> None:
         raise InputError(f"{where}: key 'version' must be a whole number from 1, got {version!r:.60}")
     if version > VERSION:
         raise InputError(f"{where}: key 'version' is {version!s:.20}, this program reads up to {VERSION}")
-    known = ("format", "version", "visibility", "parameters", "auto", "provenance")
-    for key in document:
-        if key not in known:
-            raise InputError(f"{where}: unknown key {key!r:.60}; known are {', '.join(known)}")
+
+
+def _object(document: dict[str, Any], key: str, where: str) -> dict[str, Any]:
+    value = document.get(key, {})
+    if not isinstance(value, dict):
+        raise InputError(f"{where}: key '{key}' must be an object, got {type(value).__name__}")
+    return value
 
 
 def _checked_visibility(visibility: Any, where: str) -> Visibility:
@@ -239,20 +252,29 @@ def _checked_visibility(visibility: Any, where: str) -> Visibility:
     return visibility
 
 
-def _checked_auto(document: dict[str, Any], where: str) -> AutoPrior | None:
+def _checked_auto(document: dict[str, Any], lloyd_iterations: Any, where: str) -> AutoPrior | None:
     if "auto" not in document:
         return None
-    if document.get("visibility") != "maps":
+    visibility = document.get("visibility", DEFAULT_VISIBILITY)
+    if visibility != "maps":
+        raise InputError(f"{where}: key 'auto' goes with visibility 'maps', got {visibility!r}")
+    if lloyd_iterations != 0:
         raise InputError(
-            f"{where}: key 'auto' goes with visibility 'maps', got {document.get('visibility')!r}"
-        )
-    relaxation = document["parameters"]["density_relaxation"]
-    if relaxation != 0:
-        raise InputError(
-            f"{where}: key 'auto' goes with parameters.density_relaxation 0, for its α is that of points, "
-            f"got {relaxation}"
+            f"{where}: key 'auto' goes with quality.lloyd_iterations 0, for its α is that of points, "
+            f"got {lloyd_iterations!r:.60}"
         )
     return AutoPrior.validated(document["auto"], f"{where}: auto")
+
+
+def _checked_fit(fit: dict[str, Any], where: str) -> FitNote:
+    for key, value in fit.items():
+        if key not in ("status", "sentence"):
+            raise InputError(f"{where}: fit: unknown key {key!r:.60}; known are status, sentence")
+        if not isinstance(value, str):
+            raise InputError(f"{where}: fit.{key}: must be a string, got {value!r:.60}")
+    if "status" not in fit:
+        raise InputError(f"{where}: fit: key 'status' is missing")
+    return FitNote(**fit)
 
 
 def _checked_provenance(provenance: Any, where: str) -> dict[str, str | int | float]:
@@ -267,3 +289,17 @@ def _checked_provenance(provenance: Any, where: str) -> dict[str, str | int | fl
                 f"{where}: provenance.{key!r:.60} must be a string or a finite number, got {value!r:.60}"
             )
     return provenance
+
+
+def _check_checksum(checksum: Any, config: TunedConfig, where: str) -> None:
+    if checksum != _checksum(_document(config)):
+        raise InputError(
+            f"{where}: key 'checksum' does not fit the values; after an edit by hand, renew it: "
+            f"vpltune export {where} --to json -o {where} --renew-checksum"
+        )
+
+
+def _checksum(document: dict[str, Any]) -> str:
+    """Taken of the values, so that a file may be formatted anew: sorted keys, no blanks."""
+    canonical = json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return _CHECKSUM_PREFIX + hashlib.sha256(canonical.encode("ascii")).hexdigest()

@@ -2,7 +2,7 @@
 
 Everything that the runtime draws from is there, and nothing that it draws: triangles in world space, texels,
 camera, lights and the faces of their reflective shadow maps, the config. `examples/standalone_reader.py`
-draws the picture from it without this package; the page of `vpltune export --to web` carries one inside.
+draws the image from it without this package; the page of `vpltune export --to web` carries one inside.
 """
 
 import json
@@ -89,7 +89,7 @@ def scene_bundle(
         },
         "point_table": {"kind": "r2", "steps": list(R2_STEPS)},
         "vpl_importance": _vpl_importance(config, count),
-        "vpl_cells": _vpl_cells(config),
+        "clustered_discs": _clustered_discs(config),
         "visibility_maps": _visibility_maps(options, config),
         "draws": draws,
         "textures": [_texture(texture, binary) for texture in (*scene.textures, WHITE)],
@@ -109,14 +109,14 @@ def _vpl_importance(config: TunedConfig, face_count: int) -> dict[str, Any]:
     }
 
 
-def _vpls_are_cells(config: TunedConfig) -> bool:
-    return config.parameters.density_relaxation > 0 and config.parameters.vpl_count <= LARGEST_COUNT
+def _vpls_are_discs(config: TunedConfig) -> bool:
+    return config.parameters.lloyd_iterations > 0 and config.parameters.vpl_count <= LARGEST_COUNT
 
 
-def _vpl_cells(config: TunedConfig) -> dict[str, Any]:
+def _clustered_discs(config: TunedConfig) -> dict[str, Any]:
     return {
         # 0: VPLs are points, and the rest says nothing.
-        "steps": config.parameters.density_relaxation if _vpls_are_cells(config) else 0,
+        "steps": config.parameters.lloyd_iterations if _vpls_are_discs(config) else 0,
         "samples": sample_count(config.parameters.vpl_count),
         "normal_reach": NORMAL_REACH,
         "disc": {
@@ -142,7 +142,7 @@ def _visibility_maps(options: RuntimeOptions, config: TunedConfig) -> dict[str, 
 def left_out(config: TunedConfig) -> tuple[str, ...]:
     """What of a config is not drawn outside the runtime, a sentence each."""
     sentences = []
-    if config.parameters.screen_space_strength > 0.0 and not _vpls_are_cells(config):
+    if config.parameters.screen_space_strength > 0.0 and not _vpls_are_discs(config):
         sentences.append("The screen-space near field is drawn by the runtime alone")
     return tuple(sentences)
 

@@ -1,4 +1,4 @@
-"""Pictures on disk: PNG for display, EXR for linear values; row 0 is at the top in both."""
+"""Images on disk: PNG for display, EXR for linear values; row 0 is at the top in both."""
 
 from pathlib import Path
 from typing import Literal
@@ -25,9 +25,9 @@ def require_extension(path: Path, *extensions: str) -> str:
 
 
 def write_png(
-    path: Path, picture: UInt8[np.ndarray, "height width 3"] | Float[np.ndarray, "height width 3"]
+    path: Path, image: UInt8[np.ndarray, "height width 3"] | Float[np.ndarray, "height width 3"]
 ) -> None:
-    """Write a display-referred picture (already sRGB-encoded) with 8 bits per channel.
+    """Write a display-referred image (already sRGB-encoded) with 8 bits per channel.
 
     Floats are in [0, 1]: 1 is white, values beyond are clamped, and rounding is to the nearest step.
 
@@ -35,12 +35,12 @@ def write_png(
         InputError: the name does not end in .png, a float is NaN, or the path cannot be written to.
     """
     require_extension(path, ".png")
-    if picture.dtype != np.uint8:
-        if np.isnan(picture).any():
-            raise InputError(f"{path}: the picture holds NaN, which no PNG can show")
-        picture = np.round(np.clip(picture, 0.0, 1.0) * 255.0).astype(np.uint8)
+    if image.dtype != np.uint8:
+        if np.isnan(image).any():
+            raise InputError(f"{path}: the image holds NaN, which no PNG can show")
+        image = np.round(np.clip(image, 0.0, 1.0) * 255.0).astype(np.uint8)
     with written_whole(Path(path)) as temporary:
-        Image.fromarray(picture, "RGB").save(temporary, optimize=False)
+        Image.fromarray(image, "RGB").save(temporary, optimize=False)
 
 
 def write_exr(

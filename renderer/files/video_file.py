@@ -15,7 +15,7 @@ from vpltune.renderer.files.image_file import write_png
 QUALITY = 8
 """Of imageio-ffmpeg's 0 to 10: next to no visible loss."""
 
-Picture = UInt8[np.ndarray, "height width 3"]
+Image = UInt8[np.ndarray, "height width 3"]
 
 
 def check_clip_path(path: Path, size: tuple[int, int]) -> None:
@@ -36,7 +36,7 @@ def check_clip_path(path: Path, size: tuple[int, int]) -> None:
 
 
 @contextlib.contextmanager
-def clip_writer(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Picture], None]]:
+def clip_writer(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Image], None]]:
     """Yield a function that takes the frames one by one; none is kept.
 
     An .mp4 appears when the block ends well, whole or not at all. In a folder, each frame is whole, and
@@ -53,32 +53,32 @@ def clip_writer(path: Path, size: tuple[int, int], fps: float) -> Iterator[Calla
         return
     count = 0
 
-    def write_numbered(picture: Picture) -> None:
+    def write_numbered(image: Image) -> None:
         nonlocal count
-        write_png(path / f"frame_{count:05d}.png", picture)
+        write_png(path / f"frame_{count:05d}.png", image)
         count += 1
 
     yield write_numbered
 
 
 @contextlib.contextmanager
-def _encoder(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Picture], None]]:
+def _encoder(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Image], None]]:
     encoder = imageio_ffmpeg.write_frames(
         str(path),
         size,
         fps=fps,
         codec="libx264",
         quality=QUALITY,
-        # Two divides every even size; the library's 16 would stretch the picture.
+        # Two divides every even size; the library's 16 would stretch the image.
         macro_block_size=2,
         output_params=["-movflags", "+faststart"],
         ffmpeg_log_level="error",
     )
     encoder.send(None)
 
-    def write(picture: Picture) -> None:
+    def write(image: Image) -> None:
         try:
-            encoder.send(np.ascontiguousarray(picture))
+            encoder.send(np.ascontiguousarray(image))
         except OSError as error:
             raise MachineError(
                 f"{path.name}: the video encoder failed ({str(error).splitlines()[0]})"

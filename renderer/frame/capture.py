@@ -1,4 +1,4 @@
-"""Reading a drawn frame back into numpy, row 0 at the top, for the tuner, tests and picture files."""
+"""Reading a drawn frame back into numpy, row 0 at the top, for the tuner, tests and image files."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -77,7 +77,7 @@ class CapturedFrame:
     """Radius of the disc that the VPL stands for."""
     vpl_flux: Float32[np.ndarray, "vpls 3"]
     """Reflected radiant flux [W]."""
-    vpls_are_cells: bool
+    vpls_are_discs: bool
     """Whether they shine as discs, and not as points."""
     visibility_maps: VisibilityMaps | None
     """None where the config asks for none."""
@@ -90,7 +90,7 @@ def capture_frame(frame: Frame, view: View, *, maps: bool = True) -> CapturedFra
     visibility maps, which weigh the most."""
     context = frame.gbuffer.depth.ctx
     context.memory_barrier(context.BUFFER_UPDATE_BARRIER_BIT)
-    depth_buffer = read_picture(frame.gbuffer.depth)
+    depth_buffer = read_image(frame.gbuffer.depth)
     valid = depth_buffer > 0.0
     near_plane = np.float32(frame.camera(view).near_plane)
     depth = np.divide(near_plane, depth_buffer, out=np.zeros_like(depth_buffer), where=valid)
@@ -101,16 +101,16 @@ def capture_frame(frame: Frame, view: View, *, maps: bool = True) -> CapturedFra
         valid=valid,
         depth=depth,
         position_world=position.astype(np.float32),
-        normal_world=octahedral_decode(read_picture(frame.gbuffer.normal)),
-        albedo=read_picture(frame.gbuffer.albedo)[..., :3].astype(np.float32),
-        direct_irradiance=read_picture(frame.direct_irradiance)[..., :3],
-        vpl_irradiance=read_picture(frame.vpl_irradiance)[..., :3],
-        indirect_irradiance=read_picture(frame.indirect_irradiance)[..., :3],
+        normal_world=octahedral_decode(read_image(frame.gbuffer.normal)),
+        albedo=read_image(frame.gbuffer.albedo)[..., :3].astype(np.float32),
+        direct_irradiance=read_image(frame.direct_irradiance)[..., :3],
+        vpl_irradiance=read_image(frame.vpl_irradiance)[..., :3],
+        indirect_irradiance=read_image(frame.indirect_irradiance)[..., :3],
         vpl_position_world=vpls[:, 0:3],
         vpl_normal_world=vpls[:, 4:7],
         vpl_footprint=vpls[:, 3],
         vpl_flux=vpls[:, 8:11],
-        vpls_are_cells=frame.vpls_are_cells,
+        vpls_are_discs=frame.vpls_are_discs,
         visibility_maps=_visibility_maps(frame) if maps else None,
         scene_length=float(statistics[2]),
     )
@@ -147,7 +147,7 @@ def _met_surfaces(
 _DTYPES = {"f1": np.uint8, "f2": np.float16, "f4": np.float32, "nu2": np.uint16}
 
 
-def read_picture(texture: moderngl.Texture) -> np.ndarray:
+def read_image(texture: moderngl.Texture) -> np.ndarray:
     """A texture as [height, width] or [height, width, channels], row 0 at the top.
 
     Normalised 16-bit channels come back as float32 in [0, 1], other types as they are stored.

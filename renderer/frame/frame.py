@@ -12,7 +12,7 @@ from jaxtyping import Float32
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.frame.light_pre_pass import LightPrePass
 from vpltune.renderer.frame.passes.auto_parameters import AutoParametersPass
-from vpltune.renderer.frame.passes.clustered_discs import LARGEST_COUNT, VplCellsPass
+from vpltune.renderer.frame.passes.clustered_discs import LARGEST_COUNT, ClusteredDiscsPass
 from vpltune.renderer.frame.passes.direct_light import DirectLightPass
 from vpltune.renderer.frame.passes.geometry import GeometryPass
 from vpltune.renderer.frame.passes.interleaved_filter import InterleavedFilterPass
@@ -54,7 +54,7 @@ from vpltune.renderer.scene.views import View
 
 
 class Frame:
-    """The targets and passes for one picture size, one set of light faces and one VPL count.
+    """The targets and passes for one image size, one set of light faces and one VPL count.
 
     Nothing is read back: what a pass makes, the next one reads on the GPU.
     """
@@ -95,7 +95,7 @@ class Frame:
         self.virtual_point_lights = VirtualPointLightsPass(
             context, self.rsm, vpl_count, options.point_table, options.rsm_filtering, cells
         )
-        self._vpl_cells: VplCellsPass | None = None
+        self._clustered_discs: ClusteredDiscsPass | None = None
         self._direct_light = DirectLightPass(context, rsm_resolution)
         self._hierarchy = hierarchy
         self.vpl_visibility_maps: VplVisibilityMapsPass | None = None
@@ -107,7 +107,7 @@ class Frame:
         self._scene_statistics: SceneStatisticsPass | None = None
         if auto_parameters is not None:
             self._scene_statistics = SceneStatisticsPass(context, self._visibility)
-        self.vpls_are_cells = False
+        self.vpls_are_discs = False
         """Of the frame drawn last; else they are points."""
         interleave = options.interleave_for(vpl_count)
         self._vpl_gather = VplGatherPass(context, interleave, self._visibility)
@@ -156,7 +156,7 @@ class Frame:
     ) -> LightAccumulation | None:
         """What camera and lights see, direct light, and how VPLs are to be spread."""
         camera = self.camera(view)
-        # Passes write into pictures that the last frame's may still be reading.
+        # Passes write into images that the last frame's may still be reading.
         self._context.memory_barrier(self._context.SHADER_IMAGE_ACCESS_BARRIER_BIT)
         self._bind_lights(records)
         self.parameters.write(parameters)
@@ -181,7 +181,7 @@ class Frame:
         accumulated: LightAccumulation | None,
     ) -> None:
         camera = self.camera(view)
-        self._place_vpls(table_rotation, parameters.density_relaxation)
+        self._place_vpls(table_rotation, parameters.lloyd_iterations)
         self._cast_visibility_maps()
         self._set_auto_parameters(camera)
         self._gather_indirect(view, parameters, accumulated)
@@ -193,14 +193,14 @@ class Frame:
         self._gather(camera)
         self.indirect_irradiance = self.vpl_irradiance
         # Discs withhold nothing that a near field would have to give back.
-        if parameters.screen_space_strength > 0.0 and not self.vpls_are_cells:
+        if parameters.screen_space_strength > 0.0 and not self.vpls_are_discs:
             self._add_near_field(camera, len(view.lights), accumulated)
             self.indirect_irradiance = self.near_field_irradiance
 
     def resolve(self, share: tuple[float, float], exposure: float | None) -> None:
-        """From the irradiance buffers to radiance and the display picture.
+        """From the irradiance buffers to radiance and the display image.
 
-        `share` weighs direct and indirect light; `exposure` None measures it from the picture.
+        `share` weighs direct and indirect light; `exposure` None measures it from the image.
         """
         self._material_resolve.draw(
             self.gbuffer, self.direct_irradiance, self.indirect_irradiance, share, self.radiance
@@ -208,11 +208,11 @@ class Frame:
         self.tone_map(exposure)
 
     def tone_map(self, exposure: float | None) -> None:
-        """From radiance to the display picture."""
+        """From radiance to the display image."""
         self._tone_mapping.draw(self.radiance, exposure, self.display)
 
     def read_exposure(self) -> float:
-        """The exposure of the display picture: waits for the GPU."""
+        """The exposure of the display image: waits for the GPU."""
         return self._tone_mapping.read_exposure()
 
     def read_statistics(self, view: View) -> Float32[np.ndarray, " statistics"]:
@@ -228,15 +228,15 @@ class Frame:
 
     def _place_vpls(self, table_rotation: tuple[float, float], relaxation: int) -> None:
         vpls = self.virtual_point_lights
-        self.vpls_are_cells = relaxation > 0 and vpls.count <= LARGEST_COUNT
-        if not self.vpls_are_cells:
+        self.vpls_are_discs = relaxation > 0 and vpls.count <= LARGEST_COUNT
+        if not self.vpls_are_discs:
             vpls.draw(self.rsm, table_rotation)
             return
-        if self._vpl_cells is None:
-            self._vpl_cells = VplCellsPass(self._context, vpls.count)
-        vpls.draw(self.rsm, table_rotation, self._vpl_cells.sample_count)
+        if self._clustered_discs is None:
+            self._clustered_discs = ClusteredDiscsPass(self._context, vpls.count)
+        vpls.draw(self.rsm, table_rotation, self._clustered_discs.sample_count)
         assert vpls.samples is not None
-        self._vpl_cells.draw(vpls.samples, vpls.virtual_point_lights, relaxation)
+        self._clustered_discs.draw(vpls.samples, vpls.virtual_point_lights, relaxation)
 
     def _cast_visibility_maps(self) -> None:
         if self.vpl_visibility_maps is not None and self._hierarchy is not None:
@@ -250,9 +250,9 @@ class Frame:
             self._auto_parameters.draw()
 
     def _gather(self, camera: CameraUniforms) -> None:
-        count, picture, cells = self.virtual_point_lights.count, self.vpl_irradiance, self.vpls_are_cells
+        count, image, cells = self.virtual_point_lights.count, self.vpl_irradiance, self.vpls_are_discs
         if self._interleaved_filter is None:
-            self._vpl_gather.draw(camera, self.gbuffer, count, picture, cells=cells)
+            self._vpl_gather.draw(camera, self.gbuffer, count, image, cells=cells)
             return
         self._vpl_gather.draw(
             camera, self.gbuffer, count, self._interleaved_irradiance, self._interleaved_direction, cells
@@ -261,11 +261,11 @@ class Frame:
             camera,
             self.gbuffer,
             self._interleaved_irradiance,
-            picture,
+            image,
             direction=self._interleaved_direction,
             pixel_list=self._pixel_list,
         )
-        self._vpl_gather.refine(camera, self.gbuffer, count, self._pixel_list, picture, cells)
+        self._vpl_gather.refine(camera, self.gbuffer, count, self._pixel_list, image, cells)
 
     def _add_near_field(
         self, camera: CameraUniforms, light_count: int, accumulated: LightAccumulation | None

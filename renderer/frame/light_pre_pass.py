@@ -1,6 +1,6 @@
 """Light pre-pass (Engel 2008): dynamic lights summed at every pixel, by volumes or in tiles.
 
-Which of the two is faster hangs on the machine, the picture size and the lights; it is measured, not assumed.
+Which of the two is faster hangs on the machine, the image size and the lights; it is measured, not assumed.
 """
 
 import time

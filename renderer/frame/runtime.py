@@ -1,4 +1,4 @@
-"""The runtime: a scene and a tuned config in, pictures out."""
+"""The runtime: a scene and a tuned config in, images out."""
 
 import functools
 from collections.abc import Callable, Sequence
@@ -12,7 +12,7 @@ from jaxtyping import Float32
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, placement
 from vpltune.renderer.config.tuned_config import TunedConfig, Visibility, read_config
-from vpltune.renderer.frame.capture import CapturedFrame, capture_frame, read_picture
+from vpltune.renderer.frame.capture import CapturedFrame, capture_frame, read_image
 from vpltune.renderer.frame.frame import Frame, frame_light_records
 from vpltune.renderer.frame.frame_timing import FrameTiming, frame_milliseconds
 from vpltune.renderer.frame.passes.auto_parameters import AutoParametersPass
@@ -59,7 +59,7 @@ class Runtime:
 
     Example:
         >>> runtime = Runtime(read_scene(path), "default")
-        >>> picture = runtime.render(view)  # [height, width, 3], uint8, sRGB
+        >>> image = runtime.render(view)  # [height, width, 3], uint8, sRGB
 
     Raises:
         InputError: the config cannot be read.
@@ -129,15 +129,15 @@ class Runtime:
             }[layer]
         frame = self._draw(view, lights=lights)
         frame.resolve(_SHARES.get(layer, (1.0, 1.0)), exposure)
-        picture = read_picture(frame.display if layer == "final" else frame.radiance)[..., :3]
+        image = read_image(frame.display if layer == "final" else frame.radiance)[..., :3]
         check_errors(self._context, f"layer {layer} of view {view.name}")
-        return np.ascontiguousarray(picture)
+        return np.ascontiguousarray(image)
 
     @_on_own_context
     def draw(
         self, view: View, exposure: float | None = None, lights: DynamicLights | None = None
     ) -> moderngl.Texture:
-        """Draw a view up to the 8-bit display picture, which stays on the GPU: nothing is read back.
+        """Draw a view up to the 8-bit display image, which stays on the GPU: nothing is read back.
 
         Row 0 is at the bottom; the texture is the frame's own and holds until the next draw.
         """
@@ -150,20 +150,20 @@ class Runtime:
         """Direct plus indirect radiance, [height, width, 3] float32, linear, without a tone curve."""
         frame = self._draw(view, lights=lights)
         frame.resolve((1.0, 1.0), 1.0)
-        return np.ascontiguousarray(read_picture(frame.radiance)[..., :3])
+        return np.ascontiguousarray(read_image(frame.radiance)[..., :3])
 
     @_on_own_context
     def display(self, radiance: np.ndarray, exposure: float | None = None) -> np.ndarray:
-        """Any radiance picture, [height, width, 3 or 4], through this runtime's exposure and tone curve.
+        """Any radiance image, [height, width, 3 or 4], through this runtime's exposure and tone curve.
 
-        Returns [height, width, 3] uint8, sRGB. References are shown the same way as our own pictures.
+        Returns [height, width, 3] uint8, sRGB. References are shown the same way as our own images.
         """
         frame = self._frame((radiance.shape[1], radiance.shape[0]), 1)
         pixels = np.ones((*radiance.shape[:2], 4), np.float32)
         pixels[..., : radiance.shape[2]] = radiance
         frame.radiance.write(np.ascontiguousarray(pixels[::-1]).tobytes())
         frame.tone_map(exposure)
-        return np.ascontiguousarray(read_picture(frame.display)[..., :3])
+        return np.ascontiguousarray(read_image(frame.display)[..., :3])
 
     @_on_own_context
     def pass_milliseconds(
@@ -190,7 +190,7 @@ class Runtime:
 
     @_on_own_context
     def exposure(self) -> float:
-        """What multiplied radiance in the last picture for display: for the next ones of a sequence.
+        """What multiplied radiance in the last image for display: for the next ones of a sequence.
 
         Raises:
             ValueError: there was none yet.
@@ -199,7 +199,7 @@ class Runtime:
 
     @_on_own_context
     def drawn_parameters(self) -> ArtistParameters:
-        """What the last picture was drawn with, where a prior sets them: waits for the GPU.
+        """What the last image was drawn with, where a prior sets them: waits for the GPU.
 
         Raises:
             ValueError: there was none yet.
@@ -219,7 +219,7 @@ class Runtime:
 
     @_on_own_context
     def pose(self, pose: Pose) -> None:
-        """Move the scene; takes effect with the next picture."""
+        """Move the scene; takes effect with the next image."""
         self.scene_buffers.set_pose(pose.transforms, pose.joint_matrices)
 
     @_on_own_context
@@ -275,7 +275,7 @@ class Runtime:
         for each in parameters[1:]:
             self.parameters = each
             frame.gather_again(view, self._gathered_parameters())
-            images.append(np.ascontiguousarray(read_picture(frame.indirect_irradiance)[..., :3]))
+            images.append(np.ascontiguousarray(read_image(frame.indirect_irradiance)[..., :3]))
         check_errors(self._context, f"the irradiance of view {view.name}")
         return captured, images
 
@@ -297,7 +297,7 @@ class Runtime:
 
     def _gathered_parameters(self) -> ArtistParameters:
         if self.visibility == "none":
-            return replace(self.parameters, falloff_transmittance=0.0)
+            return replace(self.parameters, extinction_coefficient=0.0)
         return self.parameters
 
     def _frame(self, size: tuple[int, int], face_count: int) -> Frame:
@@ -305,7 +305,7 @@ class Runtime:
         auto = self._auto_parameters
         key = (size, face_count, self.parameters.vpl_count, maps, auto is not None)
         if key not in self._frames:
-            # One frame's targets at a time: pictures of many sizes must not add up in GPU memory.
+            # One frame's targets at a time: images of many sizes must not add up in GPU memory.
             self._frames.clear()
             free_dropped(self._context)
             resolution = self._face_resolution(face_count)
@@ -326,7 +326,7 @@ class Runtime:
 
     def _last_frame(self, asked: str) -> Frame:
         if not self._frames:
-            raise ValueError(f"{asked}: no picture has been drawn yet")
+            raise ValueError(f"{asked}: no image has been drawn yet")
         (frame,) = self._frames.values()
         return frame
 

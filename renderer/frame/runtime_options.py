@@ -48,13 +48,13 @@ class RuntimeOptions:
 
     adaptation_frames: float = 0.0
     """Time constant, in frames, over which the parameters of a config with a prior (`auto`) follow what is
-    measured. 0 takes what each picture asks for, as a still needs it; a clip or a game has 15, a quarter of a
+    measured. 0 takes what each image asks for, as a still needs it; a clip or a game has 15, a quarter of a
     second, and then no parameter moves by more than `passes.auto_parameters.LARGEST_STEP` a frame."""
 
     def interleave_for(self, vpl_count: int) -> int:
         """The side of a block, as large as asked for where each of its pixels gets a VPL.
 
-        Without, most pixels of a window are dark, and a window at the picture's border that has none of the
+        Without, most pixels of a window are dark, and a window at the image's border that has none of the
         lit ones passes for unlit: one VPL shared among 64 pixels lost a tenth of its light.
         """
         return max(side for side in INTERLEAVES if side <= self.interleave and side**2 <= max(1, vpl_count))

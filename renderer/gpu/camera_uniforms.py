@@ -15,7 +15,7 @@ from vpltune.renderer.scene.scene import Camera
 
 @dataclass(frozen=True, eq=False)
 class CameraUniforms:
-    """A camera for one picture size; lengths in world units."""
+    """A camera for one image size; lengths in world units."""
 
     camera_to_world: np.ndarray
     world_to_camera: np.ndarray

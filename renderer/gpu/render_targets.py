@@ -96,12 +96,12 @@ def create_reflective_shadow_map(
 
 
 def create_irradiance_target(context: moderngl.Context, size: tuple[int, int]) -> moderngl.Texture:
-    """A float32 RGBA picture; alpha is 1 where the camera sees a surface."""
+    """A float32 RGBA image; alpha is 1 where the camera sees a surface."""
     return _nearest(context.texture(size, 4, dtype="f4"))
 
 
 def create_direction_target(context: moderngl.Context, size: tuple[int, int]) -> moderngl.Texture:
-    """A picture of unit vectors in the world: octahedral, 2×16 bit."""
+    """An image of unit vectors in the world: octahedral, 2×16 bit."""
     return _nearest(context.texture(size, 2, dtype="nu2"))
 
 
@@ -115,7 +115,7 @@ class LightAccumulation:
 
 
 def create_light_accumulation_target(context: moderngl.Context, size: tuple[int, int]) -> moderngl.Texture:
-    """A half-float RGBA picture of irradiance, in the unit that `DynamicLights.accumulation_unit` states."""
+    """A half-float RGBA image of irradiance, in the unit that `DynamicLights.accumulation_unit` states."""
     return _nearest(context.texture(size, 4, dtype="f2"))
 
 
@@ -138,12 +138,12 @@ _EMPTY_PIXEL_LIST = np.array([0, 1, 1, 0], np.uint32).tobytes()
 
 
 def create_pixel_list(context: moderngl.Context, size: tuple[int, int]) -> PixelList:
-    """A list with room for every pixel of a picture of `size` = (width, height)."""
+    """A list with room for every pixel of an image of `size` = (width, height)."""
     return PixelList(context.buffer(reserve=len(_EMPTY_PIXEL_LIST) + 4 * size[0] * size[1]))
 
 
 def create_display_target(context: moderngl.Context, size: tuple[int, int]) -> moderngl.Texture:
-    """An 8-bit RGBA picture."""
+    """An 8-bit RGBA image."""
     return _nearest(context.texture(size, 4, dtype="f1"))
 
 

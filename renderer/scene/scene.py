@@ -250,7 +250,7 @@ def look_at(
 def scaled(scene: Scene, factor: float) -> Scene:
     """The same scene `factor` times as large, lights included.
 
-    Point and spot intensities grow with factor², so that irradiance, and the picture, stay the same.
+    Point and spot intensities grow with factor², so that irradiance, and the image, stay the same.
     """
     grow = np.diag([factor, factor, factor, 1.0])
     return Scene(

@@ -1,4 +1,4 @@
-"""Views: a camera, a picture size and the lights that shine, kept in `views.json` in world units."""
+"""Views: a camera, an image size and the lights that shine, kept in `views.json` in world units."""
 
 import json
 import math
@@ -21,7 +21,7 @@ SPLITS: tuple[Split, ...] = get_args(Split)
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """One picture to make: rays go through pixel centres, row 0 is at the top."""
+    """One image to make: rays go through pixel centres, row 0 is at the top."""
 
     name: str
     split: Split

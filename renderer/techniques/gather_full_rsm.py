@@ -28,7 +28,7 @@ class GatherFullRsm:
         self._program = load_compute(context, "techniques/gather_full_rsm", defines)
 
     def draw(self, view: View, parameters: ArtistParameters) -> moderngl.Texture:
-        """The irradiance picture of a view that the frame has just drawn."""
+        """The irradiance image of a view that the frame has just drawn."""
         self._vpls.buffer.bind_to_storage_buffer(buffer_bindings.VIRTUAL_POINT_LIGHTS)
         self._frame.rsm.bind(self._program, 0)
         set_uniforms(self._program, stride=self._stride, blocks=self._blocks)

@@ -25,7 +25,7 @@ class ScreenSpaceOnly:
         self._program = load_compute(context, "techniques/screen_space_only", buffer_bindings.DEFINES)
 
     def draw(self, view: View, parameters: ArtistParameters) -> moderngl.Texture:
-        """The irradiance picture of a view that the frame has just drawn."""
+        """The irradiance image of a view that the frame has just drawn."""
         frame = self._frame
         self._vpls.buffer.bind_to_storage_buffer(buffer_bindings.VIRTUAL_POINT_LIGHTS)
         frame.camera(view).bind_gbuffer(self._program, frame.gbuffer, 0)

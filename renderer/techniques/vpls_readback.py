@@ -94,7 +94,7 @@ class VplsReadback:
             self._program,
             intensity=parameters.intensity,
             falloff_footprint=parameters.falloff_footprint,
-            falloff_transmittance=parameters.falloff_transmittance,
+            extinction_coefficient=parameters.extinction_coefficient,
         )
         self._framebuffer.use()
         self._framebuffer.clear()

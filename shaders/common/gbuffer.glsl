@@ -1,4 +1,4 @@
-// Reading the G-buffer back: row 0 of the textures is the bottom of the picture.
+// Reading the G-buffer back: row 0 of the textures is the bottom of the image.
 #include "common/octahedral.glsl"
 
 uniform sampler2D gbuffer_depth;

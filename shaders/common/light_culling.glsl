@@ -36,10 +36,10 @@ struct ViewBlock {
     vec3 box_high;
 };
 
-ViewBlock view_block(vec2 first_pixel, vec2 end_pixel, vec2 picture_size, float nearest, float farthest) {
+ViewBlock view_block(vec2 first_pixel, vec2 end_pixel, vec2 image_size, float nearest, float farthest) {
     ViewBlock block;
-    block.low = (first_pixel / picture_size * 2.0 - 1.0) * tan_half_fov;
-    block.high = (end_pixel / picture_size * 2.0 - 1.0) * tan_half_fov;
+    block.low = (first_pixel / image_size * 2.0 - 1.0) * tan_half_fov;
+    block.high = (end_pixel / image_size * 2.0 - 1.0) * tan_half_fov;
     block.nearest = nearest;
     block.farthest = farthest;
     block.box_low = vec3(min(block.low * nearest, block.low * farthest), nearest);

@@ -47,12 +47,12 @@ vec3 disc_vector(vec3 to_vpl, vec3 normal, vec3 vpl_normal, float radius) {
 }
 
 // As `disc_vector`, of one watt of the VPL's flux. `vpl_falloff` is its counterpart for points.
-vec3 cell_vector_irradiance(
+vec3 disc_vector_irradiance(
     vec3 to_vpl, vec3 normal, VirtualPointLight vpl, float scene_length, FalloffParameters parameters
 ) {
     vec3 to_vpl_in_l = to_vpl / scene_length;
     float radius = max(parameters.falloff_footprint * vpl.position_footprint.w / scene_length, DISC_LEAST_RADIUS);
-    float transmittance = exp(-parameters.falloff_transmittance * length(to_vpl_in_l));
+    float transmittance = exp(-parameters.extinction_coefficient * length(to_vpl_in_l));
     return disc_vector(to_vpl_in_l, normal, vpl.normal_area.xyz, radius)
          * (parameters.intensity / PI * transmittance / (scene_length * scene_length));
 }

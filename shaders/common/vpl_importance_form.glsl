@@ -23,7 +23,7 @@ float cell_form(vec3 position_world, vec3 normal_world, ImportanceCell cell) {
     return cosines / distance_squared / (PI * distance_squared + IMPORTANCE_SPREAD * cell.normal_area.w);
 }
 
-float cell_irradiance(vec3 position_world, vec3 normal_world, ImportanceCell cell) {
+float disc_irradiance(vec3 position_world, vec3 normal_world, ImportanceCell cell) {
     return cell.position_flux.w > 0.0 ? cell.position_flux.w * cell_form(position_world, normal_world, cell) : 0.0;
 }
 

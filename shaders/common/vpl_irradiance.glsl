@@ -5,7 +5,7 @@
 struct FalloffParameters {
     float intensity;             // k
     float falloff_footprint;     // α
-    float falloff_transmittance; // κ
+    float extinction_coefficient; // κ
 };
 
 // Irradiance of one watt of flux on a receiver in this direction, over its cosine times the distance: what does
@@ -16,7 +16,7 @@ float vpl_falloff(vec3 to_vpl, VirtualPointLight vpl, float scene_length, Fallof
     float cosine_vpl = max(-dot(vpl.normal_area.xyz, to_vpl), 0.0);
     float footprint = parameters.falloff_footprint * vpl.position_footprint.w;
     float form = cosine_vpl / distance_squared / (distance_squared + footprint * footprint);
-    float transmittance = exp(-parameters.falloff_transmittance * sqrt(distance_squared) / scene_length);
+    float transmittance = exp(-parameters.extinction_coefficient * sqrt(distance_squared) / scene_length);
     return parameters.intensity / PI * form * transmittance;
 }
 

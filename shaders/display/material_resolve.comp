@@ -4,7 +4,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 uniform sampler2D gbuffer_albedo;
 uniform sampler2D direct_irradiance;
 uniform sampler2D indirect_irradiance;
-uniform vec2 share;  // of direct and of indirect light in the picture
+uniform vec2 share;  // of direct and of indirect light in the image
 
 layout(rgba32f, binding = 0) writeonly uniform image2D out_radiance;
 

@@ -28,8 +28,8 @@ void main() {
         atomicMax(farthest_bits, floatBitsToUint(seen.farthest));
     }
     barrier();
-    vec2 picture_size = vec2(textureSize(gbuffer_depth, 0));
-    ViewBlock cell = view_block(vec2(first_tile * TILE_SIZE), vec2(end_tile * TILE_SIZE), picture_size,
+    vec2 image_size = vec2(textureSize(gbuffer_depth, 0));
+    ViewBlock cell = view_block(vec2(first_tile * TILE_SIZE), vec2(end_tile * TILE_SIZE), image_size,
                                 uintBitsToFloat(nearest_bits), uintBitsToFloat(farthest_bits));
     int start = int(gl_WorkGroupID.z) * CULL_BATCH;
     if (cell.nearest <= cell.farthest) {

@@ -43,7 +43,7 @@ vec3 near_field(Receiver receiver, ivec2 at) {
     float lost = softening / (distance_squared + softening);
     // The pixel itself is a disc, not a point: with its area, no neighbour gives more than its form factor.
     float form = cosine_receiver * cosine_emitter / distance_squared / (distance_squared + area / PI);
-    float transmittance = exp(-artist.falloff_transmittance * sqrt(distance_squared) / scene_length);
+    float transmittance = exp(-artist.extinction_coefficient * sqrt(distance_squared) / scene_length);
     return emitter.rgb * (area / PI * form * lost * transmittance);
 }
 
@@ -60,7 +60,7 @@ void main() {
     }
     float view_depth = near_plane / texelFetch(gbuffer_depth, pixel, 0).r;
     float pixel_footprint = 2.0 * tan_half_fov.y * view_depth / float(size.y);
-    // No farther than the picture is high: what is beyond would not be seen either.
+    // No farther than the image is high: what is beyond would not be seen either.
     float radius = min(artist.screen_space_radius * mean_vpl_footprint / pixel_footprint, float(size.y));
     vec3 irradiance = vec3(0.0);
     if (radius > NEAREST_PIXEL) {

@@ -1,4 +1,4 @@
-// Irradiance of one light at every pixel of the picture, blended over all draws.
+// Irradiance of one light at every pixel of the image, blended over all draws.
 #include "common/dynamic_lights.glsl"
 #include "common/gbuffer.glsl"
 

@@ -11,14 +11,14 @@ uniform vec4 normal_area;
 uniform vec3 flux;
 uniform float intensity;
 uniform float falloff_footprint;
-uniform float falloff_transmittance;
+uniform float extinction_coefficient;
 
 out vec4 out_irradiance;
 
 void main() {
     Receiver receiver = gbuffer_receiver(ivec2(gl_FragCoord.xy));
     VirtualPointLight vpl = VirtualPointLight(position_footprint, normal_area, vec4(flux, 0.0));
-    FalloffParameters parameters = FalloffParameters(intensity, falloff_footprint, falloff_transmittance);
+    FalloffParameters parameters = FalloffParameters(intensity, falloff_footprint, extinction_coefficient);
     vec3 irradiance = vpl_irradiance(receiver.position_world, receiver.normal_world, vpl, scene_length, parameters);
     out_irradiance = receiver.valid ? vec4(irradiance, 1.0) : vec4(0.0);
 }

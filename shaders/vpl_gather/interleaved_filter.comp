@@ -1,4 +1,4 @@
-// Reconstruction of interleaved pictures: every pixel takes from its neighbours on the same surface what they
+// Reconstruction of interleaved images: every pixel takes from its neighbours on the same surface what they
 // gathered and left to it (Keller and Heidrich 2001, the discontinuity buffer; Segovia et al. 2006).
 //
 // The window is n + 1 pixels wide, n = INTERLEAVE, its outer pixels counting half, so that it is centred and
@@ -52,7 +52,7 @@ Window weigh(int center, vec2 ndc, vec2 ndc_step) {
     Window window = Window(vec4(0.0), vec3(0.0));
     vec3 normal = tile_normal[center];
     float depth = tile_irradiance[center].a;
-    // Height over the pixel's plane is depth times what is linear in the picture, less the same at the pixel.
+    // Height over the pixel's plane is depth times what is linear in the image, less the same at the pixel.
     vec3 normal_camera = normal * mat3(camera_to_world);
     float slope = dot(normal_camera, vec3(ndc * tan_half_fov, -1.0));
     vec2 slope_step = normal_camera.xy * tan_half_fov * ndc_step;

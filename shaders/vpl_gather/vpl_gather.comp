@@ -4,7 +4,7 @@
 // of its pixels read the same VPLs (Segovia et al. 2006, done here by arithmetic on the pixel's index).
 // With it goes the direction that the light comes from, so that the filter can tell what a pixel's share would
 // be on its neighbours' normals.
-// With VPL_CELLS, VPLs shine as discs, and else as points.
+// With VPL_DISCS, VPLs shine as discs, and else as points.
 // With LISTED_PIXELS, the pixels are those of the list, for which sharing did not do.
 #include "common/artist_parameters.glsl"
 #include "common/gbuffer.glsl"
@@ -13,7 +13,7 @@
 
 const float PI = 3.14159265358979;
 #include "common/vpl_irradiance.glsl"
-#if VPL_CELLS
+#if VPL_DISCS
 #include "common/vpl_disc.glsl"
 #endif
 #include "common/pixel_list.glsl"
@@ -54,7 +54,7 @@ void main() {
     ivec2 pixel = own_pixel(subset);
     ivec2 size = imageSize(out_irradiance);
     FalloffParameters parameters = FalloffParameters(
-        artist.intensity * float(SUBSETS), artist.falloff_footprint, artist.falloff_transmittance);
+        artist.intensity * float(SUBSETS), artist.falloff_footprint, artist.extinction_coefficient);
 #if VISIBILITY_MAP_SIZE > 0
     VisibilityParameters visibility = VisibilityParameters(artist.visibility_bias, artist.visibility_softness);
 #endif
@@ -71,8 +71,8 @@ void main() {
         for (int i = 0; i < count; ++i) {
             VirtualPointLight vpl = batch[i];
             vec3 to_vpl = vpl.position_footprint.xyz - receiver.position_world;
-#if VPL_CELLS
-            vec3 arriving = cell_vector_irradiance(to_vpl, receiver.normal_world, vpl, scene_length, parameters);
+#if VPL_DISCS
+            vec3 arriving = disc_vector_irradiance(to_vpl, receiver.normal_world, vpl, scene_length, parameters);
 #else
             vec3 arriving = to_vpl * vpl_falloff(to_vpl, vpl, scene_length, parameters);
 #endif

@@ -1,9 +1,9 @@
-// VPL importance, part 3: how much error on the picture a cell would leave if its light were drawn too seldom.
+// VPL importance, part 3: how much error on the image a cell would leave if its light were drawn too seldom.
 //
 // Of N draws with chances p_i, of texels that give E_i(x), the variance of irradiance is Σ E_i(x)²/p_i / N - E(x)²/N.
-// Relative error over the picture, Σ_x Var(x) / (E(x)² + 0.01 mean(E)²), is least where
+// Relative error over the image, Σ_x Var(x) / (E(x)² + 0.01 mean(E)²), is least where
 //     p_i ∝ sqrt(Σ_x E_i(x)² / (E(x)² + 0.01 mean(E)²)) = Φ_i · I_i
-// (Kahn and Marshall 1953, "optimum importance function"; the sum is over the points that stand for the picture).
+// (Kahn and Marshall 1953, "optimum importance function"; the sum is over the points that stand for the image).
 #include "common/artist_parameters.glsl"
 #include "common/rsm.glsl"
 #include "common/vpl_importance.glsl"

@@ -1,4 +1,4 @@
-// VPL importance, part 2: surface points spread over the picture, and how much indirect light each gets.
+// VPL importance, part 2: surface points spread over the image, and how much indirect light each gets.
 // One workgroup for each point.
 #include "common/gbuffer.glsl"
 
@@ -20,7 +20,7 @@ void main() {
     Receiver receiver = gbuffer_receiver(min(ivec2(place * vec2(size)), size - 1));
     float irradiance = 0.0;
     for (int i = lane; i < cell_count; i += 64) {
-        irradiance += cell_irradiance(receiver.position_world, receiver.normal_world, importance_cells[i]);
+        irradiance += disc_irradiance(receiver.position_world, receiver.normal_world, importance_cells[i]);
     }
     sums[lane] = irradiance;
     barrier();

@@ -1,4 +1,4 @@
-// Indirect irradiance from some of the VPLs, added to what earlier ones gave. With VPL_CELLS, VPLs shine as discs,
+// Indirect irradiance from some of the VPLs, added to what earlier ones gave. With VPL_DISCS, VPLs shine as discs,
 // and else as points.
 #include "common/gbuffer.glsl"
 #include "common/virtual_point_lights.glsl"
@@ -6,7 +6,7 @@
 
 const float PI = 3.14159265358979;
 #include "common/vpl_irradiance.glsl"
-#ifdef VPL_CELLS
+#ifdef VPL_DISCS
 #include "common/vpl_disc.glsl"
 #endif
 #include "web/vpl_texture.glsl"
@@ -22,7 +22,7 @@ uniform int first;
 uniform int end;
 uniform float intensity;
 uniform float falloff_footprint;
-uniform float falloff_transmittance;
+uniform float extinction_coefficient;
 
 layout(location = 0) out vec4 out_irradiance;
 
@@ -33,14 +33,14 @@ void main() {
     if (!receiver.valid) {
         return;
     }
-    FalloffParameters parameters = FalloffParameters(intensity, falloff_footprint, falloff_transmittance);
+    FalloffParameters parameters = FalloffParameters(intensity, falloff_footprint, extinction_coefficient);
     float scene_length = measured_scene_length();
     vec3 irradiance = vec3(0.0);
     for (int i = first; i < end; ++i) {
         VirtualPointLight vpl = vpl_at(i);
-#ifdef VPL_CELLS
+#ifdef VPL_DISCS
         vec3 to_vpl = vpl.position_footprint.xyz - receiver.position_world;
-        vec3 arriving = cell_vector_irradiance(to_vpl, receiver.normal_world, vpl, scene_length, parameters);
+        vec3 arriving = disc_vector_irradiance(to_vpl, receiver.normal_world, vpl, scene_length, parameters);
         vec3 unoccluded = vpl.flux.rgb * max(dot(receiver.normal_world, arriving), 0.0);
 #else
         vec3 unoccluded = vpl_irradiance(

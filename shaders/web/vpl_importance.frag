@@ -1,4 +1,4 @@
-// VPL importance, part 3: how much error on the picture a cell would leave if its light were drawn too seldom, by the
+// VPL importance, part 3: how much error on the image a cell would leave if its light were drawn too seldom, by the
 // formula of shaders/vpl_importance/vpl_importance.comp.
 const float PI = 3.14159265358979;
 #include "web/vpl_importance_texture.glsl"

@@ -1,4 +1,4 @@
-// VPL importance, part 2: surface points spread over the picture, and how much indirect light each gets.
+// VPL importance, part 2: surface points spread over the image, and how much indirect light each gets.
 #include "common/gbuffer.glsl"
 
 const float PI = 3.14159265358979;
@@ -21,7 +21,7 @@ void main() {
     float irradiance = 0.0;
     for (int y = 0; y < cells.y; ++y) {
         for (int x = 0; x < cells.x; ++x) {
-            irradiance += cell_irradiance(
+            irradiance += disc_irradiance(
                 receiver.position_world, receiver.normal_world, importance_cell_at(ivec2(x, y)));
         }
     }

@@ -30,7 +30,7 @@ def test_rows_and_files(tmp_path):
     for name in ("vpls_for_same_error.room", "vpls_for_same_error.hall", "vpls_for_same_error"):
         assert rows[name].ratio == pytest.approx(0.5)
     assert rows["tuned_32_over_default_256"].value == pytest.approx(4.0)
-    assert rows["tuned_32_over_cells_256"].value == pytest.approx(4.0)
+    assert rows["tuned_32_over_discs_256"].value == pytest.approx(4.0)
     assert rows["tuned_vpls_for_default_256.room"].value == pytest.approx(128.0)
     assert rows["tuned_32_a_pixel_2x2_over_default_256"].value == pytest.approx(0.01 / (2.0 / 256))
     assert np.isfinite([row.ratio for row in rows.values()]).all()

@@ -88,7 +88,7 @@ def test_searches_one_after_the_other_share_a_trace_and_a_clock():
 
 def test_the_surrogate_stands_for_the_runtime(gl_context):
     """All seven parameters away from the defaults: to 1e-3, and the runtime's frames are counted."""
-    base = ArtistParameters(vpl_count=24, density_relaxation=2)
+    base = ArtistParameters(vpl_count=24, lloyd_iterations=2)
     config = TunedConfig(base, visibility="maps")
     runtime = CountingRuntime(colored_room(), config, rsm_resolution=128, context=gl_context)
     view, rotations = corner_view("spot", (24, 18)), ((0.0, 0.0), (0.3, 0.6))
@@ -101,12 +101,12 @@ def test_the_surrogate_stands_for_the_runtime(gl_context):
     drawn = loss(point)
     assert runtime.frames == 2
     parameters = SPACE.parameters(point, base)
-    assert parameters.density_relaxation == 2
+    assert parameters.lloyd_iterations == 2
     rotated = rotated_views(runtime, views, parameters, rotations)
     surrogate = SurrogateLoss(rotated, parameters)(point[: len(SURROGATE_SPACE.names)])
     assert surrogate == pytest.approx(drawn, rel=1e-3)
-    pictures = iter(rotated)
-    assert loss.of_pictures(lambda *_: next(pictures).captured.indirect_irradiance) == pytest.approx(drawn)
+    images = iter(rotated)
+    assert loss.of_images(lambda *_: next(images).captured.indirect_irradiance) == pytest.approx(drawn)
 
 
 def search(seconds, losses, spent):

@@ -10,7 +10,7 @@ from vpltune.__main__ import run
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS
 from vpltune.renderer.config.tuned_config import TunedConfig, read_config, write_config
 from vpltune.renderer.scene.views import read_views
-from vpltune.tuner.evaluation.view_images import read_view_pictures
+from vpltune.tuner.evaluation.view_images import read_view_images
 from vpltune.tuner.metrics.view_metrics import relmse
 
 SCENE = Path(__file__).resolve().parents[2] / "configs" / "scenes" / "cornell-box.glb"
@@ -64,11 +64,11 @@ def test_metrics_say_how_they_came_about(fitted, document):
     assert min(loss["curve"]) == pytest.approx(loss["end"])
 
 
-def test_pictures_are_those_that_were_measured(fitted, document):
-    """relMSE of what pictures.npz holds is what metrics.json says, but for the half floats' rounding."""
-    pictures = read_view_pictures(fitted / "out" / "pictures.npz")
-    assert [view.index for view in pictures] == list(range(len(document["per_view"])))
-    for view, figures in zip(pictures, document["per_view"], strict=True):
+def test_images_are_those_that_were_measured(fitted, document):
+    """relMSE of what images.npz holds is what metrics.json says, but for the half floats' rounding."""
+    images = read_view_images(fitted / "out" / "images.npz")
+    assert [view.index for view in images] == list(range(len(document["per_view"])))
+    for view, figures in zip(images, document["per_view"], strict=True):
         for variant in ("default", "tuned", "ceiling"):
             shown, real = (view.indirect[name][view.valid] for name in (variant, "reference"))
             assert relmse(shown, real) == pytest.approx(figures[variant]["relmse"], rel=5e-3)
@@ -130,11 +130,11 @@ def test_evaluate_finds_the_same_figures_on_the_same_views(fitted, document, cap
             assert again["metrics"][split][name] == pytest.approx(document["metrics"][split][name], rel=1e-3)
 
 
-def test_fit_without_json_ends_with_table_picture_and_next_command(fitted, document, capfd):
+def test_fit_without_json_ends_with_table_image_and_next_command(fitted, document, capfd):
     assert run(["fit", str(SCENE), "-o", str(fitted / "again"), "--views", "1"]) == 0
     shown = capfd.readouterr().out
     assert "default" in shown
-    assert f"picture: {fitted / 'again' / 'comparison.png'}" in shown
+    assert f"image: {fitted / 'again' / 'comparison.png'}" in shown
     assert (fitted / "again" / "comparison.png").exists()
     assert f"next:    vpltune render {SCENE} --config {fitted / 'again' / 'tuned.json'}" in shown
 
@@ -144,6 +144,6 @@ def test_without_visibility_transmittance_is_left_alone(fitted, capfd):
     arguments = ["--views", "1", "--size", "64x48", "--visibility", "none", "--json"]
     assert run(["fit", str(SCENE), "-o", str(fitted / "none"), *arguments]) == 0
     document = json.loads(capfd.readouterr().out)
-    assert document["parameters"]["falloff_transmittance"] == 0.0
-    assert "falloff_transmittance" not in document["uncertainty"]
+    assert document["parameters"]["extinction_coefficient"] == 0.0
+    assert "extinction_coefficient" not in document["uncertainty"]
     assert document["status"] in ("improved", "kept")

@@ -45,13 +45,13 @@ def test_an_mp4_has_the_frames_asked_for(tmp_path, capfd):
     assert (report["frames"], report["fps"], report["output"]) == (6, 3.0, str(path))
     count, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
     assert (count, seconds) == (6, pytest.approx(2.0, abs=0.05))
-    pictures = decoded(path, (32, 24))
-    assert pictures.shape == (6, 24, 32, 3)
-    assert np.abs(np.diff(pictures.astype(int), axis=0)).mean(axis=(1, 2, 3)).min() > 0.2, "nothing moves"
+    images = decoded(path, (32, 24))
+    assert images.shape == (6, 24, 32, 3)
+    assert np.abs(np.diff(images.astype(int), axis=0)).mean(axis=(1, 2, 3)).min() > 0.2, "nothing moves"
     assert [entry.name for entry in tmp_path.iterdir()] == ["clip.mp4"]
 
 
-def test_a_folder_has_numbered_pictures_of_one_exposure(tmp_path, monkeypatch):
+def test_a_folder_has_numbered_images_of_one_exposure(tmp_path, monkeypatch):
     """All frames have the exposure that the first was measured to need: clips must not pump."""
     exposures = []
     original = Runtime.render
@@ -72,7 +72,7 @@ def test_a_folder_has_numbered_pictures_of_one_exposure(tmp_path, monkeypatch):
         assert np.abs(np.asarray(first, int) - np.asarray(third, int)).max() > 2
 
 
-def test_the_first_frame_is_the_still_picture(tmp_path):
+def test_the_first_frame_is_the_still_image(tmp_path):
     assert render(tmp_path / "frames", "--frames", "1") == 0
     assert render(tmp_path / "still.png") == 0
     with (
@@ -93,11 +93,11 @@ def test_dynamic_lights_fly_in_clips(tmp_path):
         render(tmp_path / "a", "--frames", "3", "--fps", "2", "--motion", "none", "--dynamic-lights", "40")
         == 0
     )
-    pictures = []
+    images = []
     for name in ("frame_00000.png", "frame_00002.png"):
-        with Image.open(tmp_path / "a" / name) as picture:
-            pictures.append(np.asarray(picture, int))
-    assert np.abs(pictures[0] - pictures[1]).max() > 5
+        with Image.open(tmp_path / "a" / name) as image:
+            images.append(np.asarray(image, int))
+    assert np.abs(images[0] - images[1]).max() > 5
 
 
 def test_an_interrupt_leaves_no_half_clip(tmp_path, monkeypatch):
@@ -115,7 +115,7 @@ def test_an_interrupt_leaves_no_half_clip(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_interrupt_leaves_whole_pictures(tmp_path, monkeypatch):
+def test_an_interrupt_leaves_whole_images(tmp_path, monkeypatch):
     drawn = []
     original = Runtime.render
 

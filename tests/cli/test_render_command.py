@@ -44,7 +44,7 @@ def render(views_path, output, *more):
 
 
 @pytest.mark.parametrize("layer", LAYERS)
-def test_every_layer_is_a_picture_and_an_exr(views_path, tmp_path, layer):
+def test_every_layer_is_a_image_and_an_exr(views_path, tmp_path, layer):
     for name in ("a.png", "a.exr"):
         assert render(views_path, tmp_path / name, "--layer", layer) == 0
     with Image.open(tmp_path / "a.png") as image:
@@ -76,7 +76,7 @@ def test_maps_are_the_runtimes_unless_asked_otherwise(views_path, tmp_path, capf
         assert f"[{default}]" in shown
 
 
-def test_interleaved_pictures_are_near_the_full_one(views_path, tmp_path):
+def test_interleaved_images_are_near_the_full_one(views_path, tmp_path):
     """Their energy within 5 %: at 32×24, one pixel in five stands at an edge."""
     means = []
     for n in ("1", "4"):
@@ -117,7 +117,7 @@ def test_dynamic_lights_add_to_direct_light_only(views_path, tmp_path):
     np.testing.assert_array_equal(pixels["indirect", "100"], pixels["indirect", "0"])
 
 
-def test_pictures_of_a_scaled_scene_are_the_same(views_path, tmp_path):
+def test_images_of_a_scaled_scene_are_the_same(views_path, tmp_path):
     for name, scale in (("one.exr", "1"), ("hundred.exr", "100")):
         assert render(views_path, tmp_path / name, "--layer", "irradiance", "--scale", scale) == 0
     one, hundred = read_exr(tmp_path / "one.exr"), read_exr(tmp_path / "hundred.exr")

@@ -1,4 +1,4 @@
-"""Gradients against finite differences of the runtime's own picture, and against their definition."""
+"""Gradients against finite differences of the runtime's own image, and against their definition."""
 
 from dataclasses import replace
 from functools import partial
@@ -19,9 +19,9 @@ from vpltune.tuner.surrogate.tabulated_gather import gather_tabulated, tabulate_
 from vpltune.tuner.surrogate.virtual_point_lights import gather_inputs
 from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, gather, gather_pairwise
 
-CELLS = ArtistParameters(vpl_count=64, density_relaxation=4, falloff_footprint=0.9, falloff_transmittance=0.6)
-START = ArtistParameters(intensity=1.4, falloff_footprint=0.7, falloff_transmittance=0.6, vpl_count=256)
-STEP = {"intensity": 0.05, "falloff_footprint": 0.05, "falloff_transmittance": 0.05}
+CELLS = ArtistParameters(vpl_count=64, lloyd_iterations=4, falloff_footprint=0.9, extinction_coefficient=0.6)
+START = ArtistParameters(intensity=1.4, falloff_footprint=0.7, extinction_coefficient=0.6, vpl_count=256)
+STEP = {"intensity": 0.05, "falloff_footprint": 0.05, "extinction_coefficient": 0.05}
 WITHOUT_MAPS = TunedConfig(visibility="transmittance")
 
 
@@ -31,20 +31,20 @@ WITHOUT_MAPS = TunedConfig(visibility="transmittance")
 def test_gradient_is_the_runtimes_own(gl_context, light, name, start):
     """Derivative of every pixel with respect to each parameter, the GLSL's by central differences.
 
-    Central differences of step h err by h²/6 of the third derivative, about 1e-3 here, and float32 pictures
-    add 1e-6/h: the cosine between the two derivative pictures is above 0.99999, their sizes agree to 0.3 %.
+    Central differences of step h err by h²/6 of the third derivative, about 1e-3 here, and float32 images
+    add 1e-6/h: the cosine between the two derivative images is above 0.99999, their sizes agree to 0.3 %.
     A disc's edge passes over some receivers as α moves: with a tenth of the step, 0.998 and 3 %.
     """
-    cells = start.density_relaxation > 0
+    cells = start.lloyd_iterations > 0
     step = STEP[name] / (10.0 if cells and name == "falloff_footprint" else 1.0)
     runtime = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context)
-    pictures = []
+    images = []
     for sign in (-1.0, 1.0):
         values = {**start.as_dict(), name: getattr(start, name) + sign * step}
         runtime.parameters = ArtistParameters(**values)
         captured = runtime.capture(room_view(light))
-        pictures.append(captured.indirect_irradiance[captured.valid].astype(np.float64))
-    finite = (pictures[1] - pictures[0]) / (2.0 * step)
+        images.append(captured.indirect_irradiance[captured.valid].astype(np.float64))
+    finite = (images[1] - images[0]) / (2.0 * step)
 
     receivers, vpls = gather_inputs(captured)
     point = FalloffParameters(*(jnp.float32(getattr(start, key)) for key in STEP))
@@ -59,7 +59,7 @@ def test_gradient_is_the_runtimes_own(gl_context, light, name, start):
 def test_tabulated_gradient_follows_the_full_gather(gl_context):
     """The loss gradient that the fit descends, from tables, against that of the full gather.
 
-    Within 2 % of the larger component: the table errs by up to 0.1 % in the picture.
+    Within 2 % of the larger component: the table errs by up to 0.1 % in the image.
     """
     captured = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context).capture(room_view("spot"))
     receivers, vpls = gather_inputs(captured)
@@ -68,8 +68,8 @@ def test_tabulated_gradient_follows_the_full_gather(gl_context):
     target = target_of(truth, truth)
     space = SearchSpace()
 
-    def loss(point, picture_of):
-        return weighted_squared_error(picture_of(FalloffParameters(**space.values(point))), target)
+    def loss(point, image_of):
+        return weighted_squared_error(image_of(FalloffParameters(**space.values(point))), target)
 
     point = jnp.asarray(space.point(START), jnp.float32)
     full = jax.grad(lambda p: loss(p, lambda q: gather(receivers, vpls, q)))(point)
@@ -104,14 +104,14 @@ def test_gradient_of_the_gather_is_that_of_its_definition(moving, cells):
 
 
 def test_the_gather_is_linear_in_visibility():
-    """Its derivative along the visibility itself is the picture; so is the gradient's product with it."""
+    """Its derivative along the visibility itself is the image; so is the gradient's product with it."""
     receivers, vpls = corner(np.random.default_rng(3), 60, 30)
     point = FalloffParameters(*map(jnp.float32, (1.3, 0.7, 0.6)))
     seen = jnp.asarray(np.random.default_rng(4).random((60, 30)), jnp.float32)
-    picture, along = jax.jvp(lambda share: gather(receivers, vpls, point, share), (seen,), (seen,))
-    np.testing.assert_allclose(along, picture, rtol=1e-5)
+    image, along = jax.jvp(lambda share: gather(receivers, vpls, point, share), (seen,), (seen,))
+    np.testing.assert_allclose(along, image, rtol=1e-5)
     gradient = jax.grad(lambda share: gather(receivers, vpls, point, share).sum())(seen)
-    assert float(jnp.sum(gradient * seen)) == pytest.approx(float(picture.sum()), rel=1e-5)
+    assert float(jnp.sum(gradient * seen)) == pytest.approx(float(image.sum()), rel=1e-5)
 
 
 def test_gradient_is_finite_where_receiver_and_vpl_coincide():
@@ -124,6 +124,6 @@ def test_gradient_is_finite_where_receiver_and_vpl_coincide():
     )
     for alpha in (0.05, 20.0):
         point = FalloffParameters(jnp.float32(1.0), jnp.float32(alpha), jnp.float32(0.0))
-        for picture in (gather, lambda r, v, p: gather_tabulated(tabulate_gather(r, v), p)):
-            gradient = jax.grad(lambda p, f=picture: f(receivers, vpls, p).sum())(point)
+        for image in (gather, lambda r, v, p: gather_tabulated(tabulate_gather(r, v), p)):
+            gradient = jax.grad(lambda p, f=image: f(receivers, vpls, p).sum())(point)
             assert all(np.isfinite(leaf) for leaf in jax.tree.leaves(gradient))

@@ -29,8 +29,8 @@ from vpltune.tuner.surrogate.vpl_gather import (
 
 PARAMETERS = (
     ArtistParameters(),
-    ArtistParameters(intensity=0.7, falloff_footprint=2.0, falloff_transmittance=0.8),
-    ArtistParameters(intensity=3.0, falloff_footprint=0.1, falloff_transmittance=0.0),
+    ArtistParameters(intensity=0.7, falloff_footprint=2.0, extinction_coefficient=0.8),
+    ArtistParameters(intensity=3.0, falloff_footprint=0.1, extinction_coefficient=0.0),
 )
 
 # What maps add has twins of its own: test_visibility_twins.py.
@@ -43,15 +43,15 @@ def relative_rms(value: np.ndarray, expected: np.ndarray) -> float:
 
 
 CELLS = (
-    ArtistParameters(vpl_count=32, density_relaxation=4, falloff_footprint=1.0),
+    ArtistParameters(vpl_count=32, lloyd_iterations=4, falloff_footprint=1.0),
     ArtistParameters(
         vpl_count=200,
-        density_relaxation=2,
+        lloyd_iterations=2,
         intensity=0.7,
         falloff_footprint=0.4,
-        falloff_transmittance=0.8,
+        extinction_coefficient=0.8,
     ),
-    ArtistParameters(vpl_count=200, density_relaxation=1, falloff_footprint=2.0),
+    ArtistParameters(vpl_count=200, lloyd_iterations=1, falloff_footprint=2.0),
 )
 
 
@@ -59,12 +59,12 @@ def twin_error(runtime: Runtime, view: View, parameters: ArtistParameters) -> fl
     runtime.parameters = parameters
     captured = runtime.capture(view)
     receivers, vpls = gather_inputs(captured)
-    picture = np.asarray(jax.jit(gather)(receivers, vpls, FalloffParameters.of(parameters)))
+    image = np.asarray(jax.jit(gather)(receivers, vpls, FalloffParameters.of(parameters)))
     drawn = captured.indirect_irradiance[captured.valid]
     if not drawn.any():  # four plates in a plane light nothing: both must say so
-        assert not picture.any()
+        assert not image.any()
         return 0.0
-    return relative_rms(picture, drawn)
+    return relative_rms(image, drawn)
 
 
 @pytest.mark.parametrize("parameters", (*PARAMETERS, *CELLS))

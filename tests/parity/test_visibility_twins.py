@@ -62,8 +62,8 @@ def scene_twin_error(path, gl_context) -> float:
         View(path.stem, "fitted", (64, 48), camera, lights)
     )
     drawn = captured.vpl_irradiance[captured.valid]
-    picture = surrogate(captured, PARAMETERS)
-    return relative_rms(picture, drawn) if drawn.any() else float(np.abs(picture).max())
+    image = surrogate(captured, PARAMETERS)
+    return relative_rms(image, drawn) if drawn.any() else float(np.abs(image).max())
 
 
 @pytest.mark.parametrize("path", OWN_SCENES, ids=lambda path: path.stem)
@@ -125,13 +125,13 @@ def test_nothing_between_leaves_light_as_it_is(gl_context):
 
 @pytest.mark.parametrize("factor", [0.01, 0.1, 10.0, 100.0])
 def test_scale_changes_nothing(gl_context, factor):
-    """With visibility on, a scaled scene gives the same picture to 1e-3 relative RMSE.
+    """With visibility on, a scaled scene gives the same image to 1e-3 relative RMSE.
 
     Rays that graze an edge may pass it on the other side after rounding: one texel of one map.
     """
-    picture = Runtime(colored_room(), MAPS, context=gl_context).render(room_view("spot"), "irradiance")
+    image = Runtime(colored_room(), MAPS, context=gl_context).render(room_view("spot"), "irradiance")
     grown = Runtime(scaled(colored_room(), factor), MAPS, context=gl_context)
-    assert relative_rms(grown.render(scaled_view(room_view("spot"), factor), "irradiance"), picture) < 1e-3
+    assert relative_rms(grown.render(scaled_view(room_view("spot"), factor), "irradiance"), image) < 1e-3
 
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)

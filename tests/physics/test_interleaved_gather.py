@@ -7,7 +7,7 @@ from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
-from vpltune.renderer.frame.capture import octahedral_decode, read_picture
+from vpltune.renderer.frame.capture import octahedral_decode, read_image
 from vpltune.renderer.frame.passes.interleaved_filter import InterleavedFilterPass
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
@@ -44,7 +44,7 @@ def test_other_block_sizes_are_refused(interleave):
 def test_energy_is_that_of_the_full_gather(gl_context, light, interleave):
     """Mean irradiance within 1 %, also where 1,000 VPLs do not divide by 64 and 101 × 75 pixels by 8.
 
-    Within 2 % for blocks of 8, whose windows are a tenth of so small a picture.
+    Within 2 % for blocks of 8, whose windows are a tenth of so small an image.
     """
     view = room_view(light, (101, 75))
     full = captured(gl_context, colored_room(), view, 1, vpl_count=1000)
@@ -74,7 +74,7 @@ def test_energy_of_few_vpls_is_that_of_the_full_gather(gl_context, vpl_count):
 def test_energy_of_discs_is_that_of_the_full_gather(gl_context, light):
     """Mean irradiance within 1 %, though a disc's light comes from another place for each receiver."""
     view = room_view(light, (101, 75))
-    cells = {"vpl_count": 200, "density_relaxation": 4, "falloff_footprint": 1.0}
+    cells = {"vpl_count": 200, "lloyd_iterations": 4, "falloff_footprint": 1.0}
     full = captured(gl_context, colored_room(), view, 1, **cells)
     shared = captured(gl_context, colored_room(), view, 4, **cells)
     seen = full.valid
@@ -111,19 +111,19 @@ def test_an_open_plane_is_the_mean_over_its_window(gl_context, interleave):
     np.testing.assert_allclose(shared[inner, inner], full[inner, inner], rtol=1e-3)
 
 
-def filtered(gl_context, interleave, picture, depth_and_normal, refine=False, light=None):
-    """A picture through the filter over a G-buffer of (near / distance, octahedral normal) per pixel.
+def filtered(gl_context, interleave, image, depth_and_normal, refine=False, light=None):
+    """An image through the filter over a G-buffer of (near / distance, octahedral normal) per pixel.
 
     `light` is the octahedral direction that it comes from; None leaves relighting out.
     """
-    height, width = picture.shape[:2]
+    height, width = image.shape[:2]
     size = (width, height)
     gbuffer = create_gbuffer(gl_context, size)
     depth, normal = depth_and_normal
     gbuffer.depth.write(np.ascontiguousarray(depth[::-1], np.float32).tobytes())
     gbuffer.normal.write(octahedral_texels(normal))
     interleaved, out = (create_irradiance_target(gl_context, size) for _ in range(2))
-    interleaved.write(np.ascontiguousarray(picture[::-1], np.float32).tobytes())
+    interleaved.write(np.ascontiguousarray(image[::-1], np.float32).tobytes())
     camera = camera_uniforms(Camera(np.eye(4), 0.8), size, np.array([[-1.0, -1, -1], [1, 1, 1]]))
     pixel_list = create_pixel_list(gl_context, size)
     direction = create_direction_target(gl_context, size)
@@ -132,7 +132,7 @@ def filtered(gl_context, interleave, picture, depth_and_normal, refine=False, li
     filter_pass = InterleavedFilterPass(gl_context, interleave, refine=refine, relight=light is not None)
     filter_pass.draw(camera, gbuffer, interleaved, out, direction=direction, pixel_list=pixel_list)
     listed = int(np.frombuffer(pixel_list.buffer.read(16), np.uint32)[3])
-    return read_picture(out), listed
+    return read_image(out), listed
 
 
 def octahedral_texels(encoded):
@@ -163,32 +163,32 @@ def test_a_constant_stays_itself(gl_context, interleave):
 
 @pytest.mark.parametrize("interleave", [2, 4, 8])
 def test_every_subset_counts_once(gl_context, interleave):
-    """A picture that repeats with the block becomes its own mean, wherever the window lies."""
+    """An image that repeats with the block becomes its own mean, wherever the window lies."""
     random = np.random.default_rng(4)
     shape = (32, 48)
     block = random.random((interleave, interleave, 3))
-    picture = np.ones((*shape, 4))
-    picture[..., :3] = np.tile(block, (shape[0] // interleave, shape[1] // interleave, 1))
-    out, listed = filtered(gl_context, interleave, picture, flat_wall(shape), refine=True)
+    image = np.ones((*shape, 4))
+    image[..., :3] = np.tile(block, (shape[0] // interleave, shape[1] // interleave, 1))
+    out, listed = filtered(gl_context, interleave, image, flat_wall(shape), refine=True)
     inner = slice(interleave // 2, -(interleave // 2))
     np.testing.assert_allclose(out[inner, inner, :3] - block.mean(axis=(0, 1)), 0.0, atol=1e-6)
-    assert listed < 10, "subsets this even need no second look, but for corners of the picture"
+    assert listed < 10, "subsets this even need no second look, but for corners of the image"
 
 
 def test_edges_are_kept(gl_context):
     """Black and white across a step of depth, or across an edge of normals, do not mix at all."""
     shape = (24, 24)
-    picture = np.ones((*shape, 4))
-    picture[:, 12:, :3] = 0.0
+    image = np.ones((*shape, 4))
+    image[:, 12:, :3] = 0.0
     depth, normal = flat_wall(shape)
     stepped = np.where(np.arange(24) < 12, depth, 2.0 * depth)
-    out, _ = filtered(gl_context, 4, picture, (stepped, normal))
-    np.testing.assert_array_equal(out[..., :3], picture[..., :3])
+    out, _ = filtered(gl_context, 4, image, (stepped, normal))
+    np.testing.assert_array_equal(out[..., :3], image[..., :3])
     turned = normal.copy()
     turned[:, 12:] = (1.0, 0.5)  # the octahedral code of +X
-    out, _ = filtered(gl_context, 4, picture, (depth, turned))
-    np.testing.assert_array_equal(out[..., :3], picture[..., :3])
-    mixed, _ = filtered(gl_context, 4, picture, (depth, normal))
+    out, _ = filtered(gl_context, 4, image, (depth, turned))
+    np.testing.assert_array_equal(out[..., :3], image[..., :3])
+    mixed, _ = filtered(gl_context, 4, image, (depth, normal))
     assert 0.3 < mixed[12, 12, 0] < 0.7
 
 
@@ -206,12 +206,12 @@ def test_neighbours_count_as_if_they_had_the_normal(gl_context):
     cosine = (octahedral_decode(normal.astype(np.float32)) * octahedral_decode(light.astype(np.float32))).sum(
         -1
     )
-    picture = np.ones((*shape, 4))
-    picture[..., :3] = cosine[..., None] * np.array([3.0, 2.0, 1.0])
-    out, _ = filtered(gl_context, 4, picture, (depth, normal), light=light)
-    np.testing.assert_allclose(out, picture, rtol=2e-4)
-    unturned, _ = filtered(gl_context, 4, picture, (depth, normal))
-    assert np.abs(unturned / picture - 1.0).max() > 0.1
+    image = np.ones((*shape, 4))
+    image[..., :3] = cosine[..., None] * np.array([3.0, 2.0, 1.0])
+    out, _ = filtered(gl_context, 4, image, (depth, normal), light=light)
+    np.testing.assert_allclose(out, image, rtol=2e-4)
+    unturned, _ = filtered(gl_context, 4, image, (depth, normal))
+    assert np.abs(unturned / image - 1.0).max() > 0.1
 
 
 @pytest.mark.parametrize("interleave", [2, 4, 8])
@@ -224,11 +224,11 @@ def test_pixels_on_their_own_ask_for_a_full_gather(gl_context, interleave):
     side = interleave + 1
     rows, columns = np.indices((4 * side, 4 * side)) % side
     depth = 1e-2 * 1.1 ** -(rows * side + columns).astype(float)
-    picture = np.ones((*depth.shape, 4), np.float32)
-    picture[..., :3] = random.random((*depth.shape, 1))
+    image = np.ones((*depth.shape, 4), np.float32)
+    image[..., :3] = random.random((*depth.shape, 1))
     normal = np.tile(FACING, (*depth.shape, 1))
-    out, listed = filtered(gl_context, interleave, picture, (depth, normal), refine=True)
-    np.testing.assert_allclose(out, picture, rtol=1e-6)
+    out, listed = filtered(gl_context, interleave, image, (depth, normal), refine=True)
+    np.testing.assert_allclose(out, image, rtol=1e-6)
     assert listed > 0.97 * depth.size
 
 
@@ -236,11 +236,11 @@ def test_an_absent_subset_that_is_bright_elsewhere_asks_for_a_full_gather(gl_con
     """Along a step of depth, what the far side shows of absent subsets decides, though it is not mixed in."""
     shape = (32, 32)
     depth = np.where(np.arange(32) < 16, 1.0, 2.0) * np.full(shape, 1e-4)
-    picture = np.ones((*shape, 4))
+    image = np.ones((*shape, 4))
     normal = np.tile(FACING, (*shape, 1))
-    _, even = filtered(gl_context, 4, picture, (depth, normal), refine=True)
-    picture[:, 16::4, :3] = 30.0
-    out, uneven = filtered(gl_context, 4, picture, (depth, normal), refine=True)
+    _, even = filtered(gl_context, 4, image, (depth, normal), refine=True)
+    image[:, 16::4, :3] = 30.0
+    out, uneven = filtered(gl_context, 4, image, (depth, normal), refine=True)
     np.testing.assert_array_equal(out[:, :16, :3], 1.0)
     assert even == 0
     assert uneven >= 2 * 32, "the two columns beside the step lack that subset"
@@ -252,9 +252,9 @@ def test_uneven_subsets_ask_for_a_full_gather(gl_context):
     All but the last row and column, in whose windows nothing of it is seen.
     """
     shape = (32, 32)
-    picture = np.zeros((*shape, 4))
-    picture[::4, ::4] = 1.0
-    _, listed = filtered(gl_context, 4, picture, flat_wall(shape), refine=True)
+    image = np.zeros((*shape, 4))
+    image[::4, ::4] = 1.0
+    _, listed = filtered(gl_context, 4, image, flat_wall(shape), refine=True)
     assert listed == 31 * 31
 
 
@@ -280,8 +280,8 @@ def error_and_energy(gl_context, path, visibility):
     full, shared = (
         Runtime(scene, config, RuntimeOptions(interleave=n), context=gl_context).capture(view) for n in (1, 4)
     )
-    pictures = shared.vpl_irradiance[full.valid], full.vpl_irradiance[full.valid]
-    return relmse(*pictures), energy_ratio(*pictures)
+    images = shared.vpl_irradiance[full.valid], full.vpl_irradiance[full.valid]
+    return relmse(*images), energy_ratio(*images)
 
 
 @pytest.mark.slow
@@ -290,7 +290,7 @@ def error_and_energy(gl_context, path, visibility):
 def test_our_scenes_differ_little_from_the_full_gather(gl_context, path, visibility):
     """relMSE against the full gather under 1 %, energy within 1 %, with and without visibility maps.
 
-    Where a picture has fewer pixels, windows are wider: at 480×270 the courtyard without maps is at 1.01 %.
+    Where an image has fewer pixels, windows are wider: at 480×270 the courtyard without maps is at 1.01 %.
     """
     error, energy = error_and_energy(gl_context, path, visibility)
     assert error < 0.01
@@ -312,7 +312,7 @@ def test_scenes_of_others_differ_little_from_the_full_gather(gl_context, scenes_
 
 
 def test_frames_repeat_bitwise(gl_context):
-    """The list of pixels fills in any order; the picture does not show it."""
+    """The list of pixels fills in any order; the image does not show it."""
     view = room_view("spot", (96, 72))
     runtime = Runtime(colored_room(), "default", RuntimeOptions(interleave=4), context=gl_context)
     first = runtime.capture(view).vpl_irradiance

@@ -1,4 +1,4 @@
-"""What must not change the picture: more VPLs, finer maps, more pixels, and the scene's scale."""
+"""What must not change the image: more VPLs, finer maps, more pixels, and the scene's scale."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from vpltune.renderer.scene.scene import Camera, look_at, scaled
 from vpltune.renderer.scene.views import View, scaled_view
 
 ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.15, 0.45))
-PARAMETERS = ArtistParameters(intensity=1.3, falloff_footprint=0.8, falloff_transmittance=0.3)
+PARAMETERS = ArtistParameters(intensity=1.3, falloff_footprint=0.8, extinction_coefficient=0.3)
 
 
 def mean_irradiance(gl_context, view: View, vpl_count=1024, rsm_resolution=512) -> float:
@@ -31,11 +31,11 @@ def inside_view(light: str, size=(64, 48)) -> View:
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_mean_irradiance_is_stable(gl_context, light):
-    """Doubling the VPL count, the RSM resolution or the picture size moves the mean by less than 1 %.
+    """Doubling the VPL count, the RSM resolution or the image size moves the mean by less than 1 %.
 
     The mean is over four rotations of the point table: the sun also lights the room from outside, and
     how many of 1,024 VPLs fall inside is itself uncertain by about one percent.
-    The camera stands inside, so that a picture's edge is not the room's: a silhouette between two pixels
+    The camera stands inside, so that an image's edge is not the room's: a silhouette between two pixels
     would move the mean of all seen by more.
     """
     base = mean_irradiance(gl_context, inside_view(light))
@@ -51,7 +51,7 @@ def test_mean_irradiance_is_stable(gl_context, light):
 @pytest.mark.parametrize("factor", [0.01, 0.1, 10.0, 100.0])
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_scale_changes_nothing(gl_context, light, factor):
-    """Scene, camera and light scaled together give the same picture from the same config, to 1e-3.
+    """Scene, camera and light scaled together give the same image from the same config, to 1e-3.
 
     The bound is on the relative RMSE: where rounding moves a silhouette or a shadow's edge by a texel,
     single pixels may differ.
@@ -59,8 +59,8 @@ def test_scale_changes_nothing(gl_context, light, factor):
     view = room_view(light)
     runtime = Runtime(colored_room(), TunedConfig(PARAMETERS), context=gl_context)
     other = Runtime(scaled(colored_room(), factor), TunedConfig(PARAMETERS), context=gl_context)
-    picture, grown = runtime.render_radiance(view), other.render_radiance(scaled_view(view, factor))
-    error = np.sqrt(np.mean((grown - picture) ** 2) / np.mean(picture**2))
+    image, grown = runtime.render_radiance(view), other.render_radiance(scaled_view(view, factor))
+    error = np.sqrt(np.mean((grown - image) ** 2) / np.mean(image**2))
     assert error < 1e-3
     assert other.capture(scaled_view(view, factor)).scene_length == pytest.approx(
         factor * runtime.capture(view).scene_length, rel=1e-3

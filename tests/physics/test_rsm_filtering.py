@@ -76,7 +76,7 @@ def test_filtering_steadies_a_swept_light(gl_context):
     changes = {}
     for filtering in (1, 9):
         runtime = runtime_with(speckled_floor(), gl_context, filtering, vpl_count=64, density_exponent=0.0)
-        pictures = []
+        images = []
         for step in range(12):
             light = Light(
                 "spot",
@@ -86,8 +86,8 @@ def test_filtering_steadies_a_swept_light(gl_context):
                 0.2,
                 0.5,
             )
-            pictures.append(
+            images.append(
                 runtime.render(View("sweep", "fitted", (24, 24), camera, (light,)), "irradiance").copy()
             )
-        changes[filtering] = np.abs(np.diff(pictures, axis=0)).mean()
+        changes[filtering] = np.abs(np.diff(images, axis=0)).mean()
     assert changes[9] < 0.5 * changes[1]

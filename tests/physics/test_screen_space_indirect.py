@@ -7,7 +7,7 @@ from scene_paths import OWN_SCENES
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
-from vpltune.renderer.frame.capture import read_picture
+from vpltune.renderer.frame.capture import read_image
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.dynamic_lights import DynamicLights, point_lights
 from vpltune.renderer.scene.files import read_scene
@@ -87,7 +87,7 @@ def test_pixels_know_the_footprints_of_their_vpls(gl_context, light, density_exp
     captured = runtime.capture(view)
     (frame,) = runtime._frames.values()
     with gl_context:
-        emitters = read_picture(frame._screen_space_indirect._emitter_picture)
+        emitters = read_image(frame._screen_space_indirect._emitter_image)
     position = captured.vpl_position_world @ view.camera.world_to_camera[:3, :3].T
     position = position + view.camera.world_to_camera[:3, 3]
     focal = 0.5 * view.size[1] / np.tan(view.camera.yfov / 2.0)
@@ -118,7 +118,7 @@ def test_it_gives_back_what_softening_took(gl_context):
     captured = runtime.capture(view)
     (frame,) = runtime._frames.values()
     with gl_context:
-        truth = read_picture(GatherFullRsm(gl_context, frame, 2).draw(view, parameters))[..., :3]
+        truth = read_image(GatherFullRsm(gl_context, frame, 2).draw(view, parameters))[..., :3]
     reach = 2.0 * mean_footprint(captured)
     near = captured.valid & (captured.position_world[..., 1:] < reach).all(axis=2)
     near &= truth.min(axis=2) > 0.1 * truth[near].mean()
@@ -131,7 +131,7 @@ def test_it_gives_back_what_softening_took(gl_context):
 
 @pytest.mark.parametrize("factor", [0.01, 0.1, 10.0, 100.0])
 def test_scale_changes_nothing(gl_context, factor):
-    """Scene, camera and light scaled together give the same near field, to 1e-3 of the picture."""
+    """Scene, camera and light scaled together give the same near field, to 1e-3 of the image."""
     view = corner_view()
     near = runtime_of(gl_context, corner_scene(), **STRONG).capture(view).indirect_irradiance
     other = runtime_of(gl_context, scaled(corner_scene(), factor), **STRONG)
@@ -150,8 +150,8 @@ def test_the_number_of_vpls_matters_less(gl_context):
     assert together < 0.4 * alone
 
 
-def test_the_picture_size_matters_little(gl_context):
-    """Four times the pixels: the near field's energy moves by less than 10 %, the picture's by under 2 %."""
+def test_the_image_size_matters_little(gl_context):
+    """Four times the pixels: the near field's energy moves by less than 10 %, the image's by under 2 %."""
     means = []
     for size in ((160, 120), (320, 240)):
         captured = runtime_of(gl_context, corner_scene(), vpl_count=64, **STRONG).capture(corner_view(size))
@@ -195,9 +195,9 @@ def contact_pixels(reference, reach: float) -> np.ndarray:
         cosine = offset @ normal[index] / distance
         cosine_emitter = -(offset * normal[lit][found]).sum(axis=1) / distance
         near[index] = bool(((cosine > 0.1) & (cosine_emitter > 0.1)).any())
-    picture = np.zeros(seen.shape, bool)
-    picture[seen] = near
-    return picture
+    image = np.zeros(seen.shape, bool)
+    image[seen] = near
+    return image
 
 
 @pytest.mark.slow
@@ -218,8 +218,8 @@ def test_contacts_come_nearer_to_the_reference(gl_context, path):
     near = captured.valid & contact_pixels(reference, 2.0 * mean_footprint(captured))
     truth = reference.irradiance[near]
     alone, together = (
-        np.sqrt(np.mean((picture[near] - truth) ** 2))
-        for picture in (captured.vpl_irradiance, captured.indirect_irradiance)
+        np.sqrt(np.mean((image[near] - truth) ** 2))
+        for image in (captured.vpl_irradiance, captured.indirect_irradiance)
     )
     assert together < 0.7 * alone
     seen = captured.valid & reference.valid

@@ -35,11 +35,11 @@ def carried(gl_context, visibility: str, size: int = 24) -> np.ndarray:
         RuntimeOptions(visibility_map_size=size),
         context=gl_context,
     )
-    pictures = []
+    images = []
     for placed in poses():
         runtime.scene_buffers.set_pose(placed, np.zeros((0, 4, 4)))
-        pictures.append(runtime.render(room_view("directional"), "irradiance"))
-    return np.stack(pictures)
+        images.append(runtime.render(room_view("directional"), "irradiance"))
+    return np.stack(images)
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def with_maps(gl_context):
 
 
 def test_there_is_no_lag(gl_context, with_maps):
-    """The last frame of the way is bitwise the picture of a runtime that never saw the frames before it."""
+    """The last frame of the way is bitwise the image of a runtime that never saw the frames before it."""
     runtime = Runtime(colored_room(), TunedConfig(PARAMETERS, visibility="maps"), context=gl_context)
     runtime.scene_buffers.set_pose(poses()[-1], np.zeros((0, 4, 4)))
     np.testing.assert_array_equal(runtime.render(room_view("directional"), "irradiance"), with_maps[-1])
@@ -60,13 +60,13 @@ def test_the_shadow_goes_with_the_board(gl_context, with_maps):
     taken = np.maximum(without - with_maps, 0.0).sum(axis=(1, 3))
     columns = np.arange(taken.shape[1])
     centers = (taken * columns).sum(axis=1) / taken.sum(axis=1)
-    # The picture is 64 wide and shows 2.62 across the room's middle.
+    # The image is 64 wide and shows 2.62 across the room's middle.
     way = STEP * (FRAMES - 1) * 64 / 2.62
     assert centers[-1] - centers[0] > 0.5 * way
 
 
 def test_flicker_is_bounded(gl_context, with_maps):
-    """Pictures change from frame to frame by at most 1.1 times as much as with maps of 64² texels.
+    """Images change from frame to frame by at most 1.1 times as much as with maps of 64² texels.
 
     1.00 was measured. What a finer map would show moving is the shadow itself.
     """

@@ -16,9 +16,9 @@ def runtime_of(scene, gl_context, **parameters) -> Runtime:
     return Runtime(scene, config, context=gl_context)
 
 
-def center_mean(picture: np.ndarray, half: int) -> np.ndarray:
-    height, width = picture.shape[:2]
-    middle = picture[height // 2 - half : height // 2 + half, width // 2 - half : width // 2 + half]
+def center_mean(image: np.ndarray, half: int) -> np.ndarray:
+    height, width = image.shape[:2]
+    middle = image[height // 2 - half : height // 2 + half, width // 2 - half : width // 2 + half]
     return middle.reshape(-1, 3).mean(axis=0)
 
 
@@ -114,14 +114,14 @@ def test_floor_beside_an_evenly_lit_wall(gl_context, distance):
 
 @pytest.mark.parametrize(
     "parameters",
-    [{"vpl_count": 8192}, {"vpl_count": 1024, "density_relaxation": 4, "falloff_footprint": 1.0}],
+    [{"vpl_count": 8192}, {"vpl_count": 1024, "lloyd_iterations": 4, "falloff_footprint": 1.0}],
     ids=["points", "cells"],
 )
 def test_white_furnace(gl_context, parameters):
     """Inside a closed white box lit evenly, one bounce gives back the irradiance that went in.
 
     A point light at the centre of a cube cannot light it evenly, but the mean over all walls obeys energy
-    conservation: ∫E_indirect dA = Φ_light for albedo 1. The picture of one whole wall is taken, and by
+    conservation: ∫E_indirect dA = Φ_light for albedo 1. The image of one whole wall is taken, and by
     symmetry it stands for all six. Tolerance 2 %: VPLs near the edges lose light to α, or as discs reach past
     them.
     """
@@ -135,7 +135,7 @@ def test_white_furnace(gl_context, parameters):
     camera = Camera(look_at(np.zeros(3), np.array([0.0, 0.0, -1.0])), float(np.pi / 2.0))
     runtime = runtime_of(scene_of(sides, [(1.0, 1.0, 1.0)]), gl_context, **parameters)
     captured = runtime.capture(View("furnace", "fitted", (64, 64), camera, (light,)))
-    # Pixels of a pinhole picture cover equal areas of a plane square to its axis.
+    # Pixels of a pinhole image cover equal areas of a plane square to its axis.
     mean = captured.indirect_irradiance.mean(axis=(0, 1))
     np.testing.assert_allclose(mean, 4.0 * np.pi / 24.0, rtol=2e-2)
 

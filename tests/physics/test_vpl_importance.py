@@ -1,4 +1,4 @@
-"""VPLs placed where the camera would miss them: the same light in the mean, and less noise in the picture."""
+"""VPLs placed where the camera would miss them: the same light in the mean, and less noise in the image."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def irradiances(runtime: Runtime, view: View, rotations: int) -> np.ndarray:
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 @pytest.mark.parametrize("density_importance", [pytest.param(0.5, marks=pytest.mark.slow), pytest.param(1.0)])
 def test_the_mean_over_rotations_is_the_same_light(gl_context, light, density_importance):
-    """48 rotations of 256 VPLs give the picture of 32,768: mean within 1 %, the middle pixel within 1.5 %.
+    """48 rotations of 256 VPLs give the image of 32,768: mean within 1 %, the middle pixel within 1.5 %.
 
     α is small, so that footprints, which depend on density, take little light away; pixels in corners, where
     1/d² then runs free, are noisy (RMS over all of them 2 to 16 %), so the middle one is looked at.
@@ -49,14 +49,14 @@ def test_less_noise_where_the_camera_looks(gl_context, light):
     variance = {}
     for density_importance in (0.0, 1.0):
         runtime = runtime_with(gl_context, vpl_count=64, density_importance=density_importance)
-        pictures = irradiances(runtime, view, 24)
-        mean = pictures.mean(axis=0)
-        variance[density_importance] = np.mean(pictures.var(axis=0) / (mean**2 + 0.01 * mean.mean() ** 2))
+        images = irradiances(runtime, view, 24)
+        mean = images.mean(axis=0)
+        variance[density_importance] = np.mean(images.var(axis=0) / (mean**2 + 0.01 * mean.mean() ** 2))
     assert variance[1.0] < 0.67 * variance[0.0], variance
 
 
 def test_places_that_see_nothing_say_nothing(gl_context):
-    """Where most of the picture is sky, importance still comes from the rest of it."""
+    """Where most of the image is sky, importance still comes from the rest of it."""
     runtime = runtime_with(gl_context, vpl_count=64, density_importance=1.0)
     camera = Camera(look_at(np.array([-1.0, 0.5, 8.0]), np.array([0.9, -0.7, -1.0])), 0.6)
     frame = runtime._draw(View("past", "fitted", (48, 36), camera, (ROOM_LIGHTS["spot"],)))
@@ -67,20 +67,20 @@ def test_places_that_see_nothing_say_nothing(gl_context):
 
 @pytest.mark.parametrize("factor", [0.01, 100.0])
 def test_importance_has_no_unit(gl_context, factor):
-    """Scene, camera and light scaled together: the same VPLs, to 1e-3 relative RMSE of the picture."""
+    """Scene, camera and light scaled together: the same VPLs, to 1e-3 relative RMSE of the image."""
     view = room_view("spot", (32, 24))
     chosen = {"vpl_count": 64, "density_importance": 1.0}
-    picture = runtime_with(gl_context, **chosen).render_radiance(view)
+    image = runtime_with(gl_context, **chosen).render_radiance(view)
     other = runtime_with(gl_context, scaled(colored_room(), factor), **chosen)
     grown = other.render_radiance(scaled_view(view, factor))
-    assert np.sqrt(np.mean((grown - picture) ** 2) / np.mean(picture**2)) < 1e-3
+    assert np.sqrt(np.mean((grown - image) ** 2) / np.mean(image**2)) < 1e-3
 
 
-@pytest.mark.parametrize("density_relaxation", [0, 4])
-def test_many_rotations_of_one_view_are_bitwise_those_of_one_frame_each(gl_context, density_relaxation):
+@pytest.mark.parametrize("lloyd_iterations", [0, 4])
+def test_many_rotations_of_one_view_are_bitwise_those_of_one_frame_each(gl_context, lloyd_iterations):
     """What does not depend on the rotation is drawn once, and nothing of one rotation is left in the next."""
     options = {"vpl_count": 64, "density_importance": 0.7, "screen_space_strength": 1.0}
-    runtime = runtime_with(gl_context, **options, density_relaxation=density_relaxation)
+    runtime = runtime_with(gl_context, **options, lloyd_iterations=lloyd_iterations)
     view, rotations = corner_view("spot"), ((0.0, 0.0), (0.3, 0.7), (0.9, 0.1))
     for rotation, captured in zip(rotations, runtime.captures(view, rotations), strict=True):
         alone = runtime.capture(view, rotation)
@@ -88,10 +88,10 @@ def test_many_rotations_of_one_view_are_bitwise_those_of_one_frame_each(gl_conte
             assert np.array_equal(getattr(captured, name), getattr(alone, name)), name
 
 
-@pytest.mark.parametrize("density_relaxation", [0, 4])
-def test_frames_repeat_bitwise(gl_context, density_relaxation):
+@pytest.mark.parametrize("lloyd_iterations", [0, 4])
+def test_frames_repeat_bitwise(gl_context, lloyd_iterations):
     runtime = runtime_with(
-        gl_context, vpl_count=64, density_importance=0.7, density_relaxation=density_relaxation
+        gl_context, vpl_count=64, density_importance=0.7, lloyd_iterations=lloyd_iterations
     )
     first = runtime.capture(room_view("point", (32, 24)))
     runtime.capture(room_view("spot", (32, 24)))

@@ -1,4 +1,4 @@
-"""Planted parameters come back from the runtime's own pictures."""
+"""Planted parameters come back from the runtime's own images."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -18,13 +18,13 @@ from vpltune.tuner.surrogate.tabulated_gather import gather_tabulated, tabulate_
 from vpltune.tuner.surrogate.virtual_point_lights import gather_inputs
 from vpltune.tuner.surrogate.vpl_gather import FalloffParameters
 
-PLANTED = ArtistParameters(intensity=1.35, falloff_footprint=0.8, falloff_transmittance=0.7, vpl_count=256)
+PLANTED = ArtistParameters(intensity=1.35, falloff_footprint=0.8, extinction_coefficient=0.7, vpl_count=256)
 # Maps have parameters of their own, planted in test_planted_visibility.py.
 WITHOUT_MAPS = TunedConfig(visibility="transmittance")
 
 
 def drawn_by_the_runtime(runtime: Runtime, light: str, parameters: ArtistParameters) -> CapturedView:
-    """A view whose reference is the runtime's own picture with known parameters."""
+    """A view whose reference is the runtime's own image with known parameters."""
     view = room_view(light)
     runtime.parameters = parameters
     captured = runtime.capture(view)
@@ -89,12 +89,12 @@ def test_noise_is_not_fitted(planted_views):
 
 
 def test_the_surrogate_is_what_was_planted(planted_views):
-    """The tabulated picture at the planted parameters is the runtime's: 0.3 % relative RMSE."""
+    """The tabulated image at the planted parameters is the runtime's: 0.3 % relative RMSE."""
     for view in planted_views:
         receivers, vpls = gather_inputs(view.captured)
         parameters = FalloffParameters(
-            *map(jnp.float32, (PLANTED.intensity, PLANTED.falloff_footprint, PLANTED.falloff_transmittance))
+            *map(jnp.float32, (PLANTED.intensity, PLANTED.falloff_footprint, PLANTED.extinction_coefficient))
         )
-        picture = np.asarray(gather_tabulated(tabulate_gather(receivers, vpls), parameters))
+        image = np.asarray(gather_tabulated(tabulate_gather(receivers, vpls), parameters))
         truth = view.reference.irradiance_a[view.captured.valid]
-        assert np.sqrt(np.mean((picture - truth) ** 2) / np.mean(truth**2)) < 3e-3
+        assert np.sqrt(np.mean((image - truth) ** 2) / np.mean(truth**2)) < 3e-3

@@ -1,4 +1,4 @@
-"""Bias and softness of visibility maps, and their gradients, come back from the runtime's own pictures."""
+"""Bias and softness of visibility maps, and their gradients, come back from the runtime's own images."""
 
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ PLANTED = ArtistParameters(
 
 
 def drawn_by_the_runtime(gl_context, light: str, parameters: ArtistParameters) -> CapturedView:
-    """A view whose reference is the runtime's own picture with known parameters."""
+    """A view whose reference is the runtime's own image with known parameters."""
     runtime = Runtime(colored_room(), TunedConfig(parameters, visibility="maps"), context=gl_context)
     view = room_view(light)
     captured = runtime.capture(view)
@@ -52,7 +52,7 @@ def test_recovery(gl_context):
     assert found.intensity == pytest.approx(PLANTED.intensity, rel=0.01)
 
 
-def test_gradients_against_differences_of_the_drawn_picture(gl_context):
+def test_gradients_against_differences_of_the_drawn_image(gl_context):
     """dloss/dβ and dloss/dσ of the surrogate against central differences of what the shader draws: 2 %.
 
     Steps of 1 % of each parameter: pairs on the kinks of the clamp make the loss not quite smooth.
@@ -69,9 +69,9 @@ def test_gradients_against_differences_of_the_drawn_picture(gl_context):
         return weighted_squared_error(gather(receivers, vpls, FalloffParameters.of(PLANTED), seen), target)
 
     def drawn_loss(parameters: ArtistParameters) -> float:
-        picture = drawn_by_the_runtime(gl_context, "spot", parameters).captured.indirect_irradiance[valid]
+        image = drawn_by_the_runtime(gl_context, "spot", parameters).captured.indirect_irradiance[valid]
         weight, mean = np.asarray(target.weight, np.float64), half.astype(np.float64)
-        return float(np.sum(weight * (picture - mean) ** 2))
+        return float(np.sum(weight * (image - mean) ** 2))
 
     values = (PLANTED.visibility_bias, PLANTED.visibility_softness)
     gradients = jax.grad(surrogate_loss, argnums=(0, 1))(*map(jnp.float32, values))
@@ -94,8 +94,8 @@ def test_the_small_problem_is_the_whole_one():
     for bias, softness in ((0.0005, 0.05), (0.02, 0.2), (0.1, 0.5)):
         chosen = replace(PLANTED, visibility_bias=bias, visibility_softness=softness)
         small = float(jnp.sum(residuals(jnp.asarray(SPACE.point(chosen)), (reduced,)) ** 2))
-        picture = gather(receivers, vpls, falloff, seen_share(overlap, VisibilityParameters.of(chosen)))
-        whole = weighted_squared_error(picture, target_of(half, half))
+        image = gather(receivers, vpls, falloff, seen_share(overlap, VisibilityParameters.of(chosen)))
+        whole = weighted_squared_error(image, target_of(half, half))
         assert small == pytest.approx(float(whole), rel=1e-3)
     assert np.all(np.diff(overlap_nodes()) > 0.0)
 

@@ -1,4 +1,4 @@
-"""Views whose reference is the runtime's own picture with very many VPLs."""
+"""Views whose reference is the runtime's own image with very many VPLs."""
 
 import numpy as np
 from built_scenes import ROOM_LIGHTS
@@ -11,7 +11,7 @@ from vpltune.renderer.scene.views import View
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
 MANY = ArtistParameters(vpl_count=16384, falloff_footprint=0.1)
-"""Whose picture stands for the path tracer's: it holds all that falloff and placement can be wrong about."""
+"""Whose image stands for the path tracer's: it holds all that falloff and placement can be wrong about."""
 
 
 def corner_view(light: str, size=(32, 24)) -> View:

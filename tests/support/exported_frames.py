@@ -14,7 +14,7 @@ READER = Path(__file__).resolve().parents[2] / "examples" / "standalone_reader.p
 SCENES = READER.parents[1] / "configs" / "scenes"
 CONFIG = TunedConfig(
     ArtistParameters(
-        intensity=1.3, falloff_footprint=0.8, falloff_transmittance=0.4, vpl_count=200, density_exponent=0.7
+        intensity=1.3, falloff_footprint=0.8, extinction_coefficient=0.4, vpl_count=200, density_exponent=0.7
     ),
     visibility="transmittance",
 )

@@ -20,7 +20,7 @@ class OpenedPage:
     """Addresses asked for, but those that lie in the page."""
 
     def drawn(self, state: str) -> None:
-        """Wait until pictures are drawn as `state`, for example "picture 0"."""
+        """Wait until images are drawn as `state`, for example "image 0"."""
         self.page.wait_for_function("state => document.documentElement.dataset.drawn === state", arg=state)
 
     def canvas(self, variant: str, view: int = 0) -> np.ndarray:
@@ -38,13 +38,13 @@ class OpenedPage:
 
     def photograph(self, selector: str) -> np.ndarray:
         """What is seen of an element, [height, width, 3]."""
-        with Image.open(io.BytesIO(self.page.locator(selector).first.screenshot())) as picture:
-            return np.asarray(picture.convert("RGB"))
+        with Image.open(io.BytesIO(self.page.locator(selector).first.screenshot())) as image:
+            return np.asarray(image.convert("RGB"))
 
 
 @contextlib.contextmanager
 def opened(
-    browser: Any, path: Path, *, ready: str | None = "picture 0", **context: Any
+    browser: Any, path: Path, *, ready: str | None = "image 0", **context: Any
 ) -> Iterator[OpenedPage]:
     """Open a file; `ready` is the state to wait for, and `context` what playwright's `new_context` takes."""
     with contextlib.closing(browser.new_context(**context)) as held:

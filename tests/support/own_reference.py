@@ -1,4 +1,4 @@
-"""The runtime's own picture in the place of a path tracer's: what planted parameters are recovered from."""
+"""The runtime's own image in the place of a path tracer's: what planted parameters are recovered from."""
 
 import numpy as np
 

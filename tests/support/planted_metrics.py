@@ -11,10 +11,10 @@ PLANTED = {
             "low": 0.06,
             "high": 12.0,
             "determined": False,
-            "trades_with": ["intensity", "falloff_transmittance"],
+            "trades_with": ["intensity", "extinction_coefficient"],
         },
     },
-    "error_budget": {
+    "error_breakdown": {
         "views": "fitted",
         "clamping": 0.01,
         "visibility": 0.2,

@@ -35,7 +35,7 @@ class Record:
     """Wall time of the attempt that ended it."""
     attempts: int
     output: str
-    """Folder of tuned.json, pictures and metrics, relative to the batch's own; empty where none was made."""
+    """Folder of tuned.json, images and metrics, relative to the batch's own; empty where none was made."""
     host: str
     finished: str
     """When: ISO 8601, in UTC."""

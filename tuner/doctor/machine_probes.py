@@ -61,7 +61,7 @@ def probe_opengl() -> Said:
         return {
             "state": "fallback",
             "detail": detail,
-            "fallback": "Mesa draws on the processor: the same pictures, more slowly",
+            "fallback": "Mesa draws on the processor: the same images, more slowly",
         }
     return {"state": "ok", "detail": detail}
 

@@ -41,7 +41,7 @@ def write_comparison(path: Path, runtime: Runtime, views: tuple[tuple[str, Evalu
     write_png(path, np.concatenate(rows))
 
 
-def picture_row(
+def image_row(
     runtime: Runtime, view: CapturedView, irradiance: Mapping[str, Irradiance], panel_height: int
 ) -> Pixels:
     """The reference, and beside it images of the same view with other indirect irradiance, by caption."""
@@ -49,8 +49,8 @@ def picture_row(
     exposure = _exposure(reference, view)
     size = (1, panel_height)
     panels = [_panel(runtime.display(reference, exposure), f"{view.view.name}: reference", size)]
-    for caption, picture in irradiance.items():
-        panels.append(_panel(runtime.display(view.runtime_radiance(picture), exposure), caption, size))
+    for caption, image in irradiance.items():
+        panels.append(_panel(runtime.display(view.runtime_radiance(image), exposure), caption, size))
     return np.concatenate(panels, axis=1)
 
 
@@ -72,12 +72,12 @@ def _rows(runtime: Runtime, evaluated: EvaluatedView, shown_for: str) -> list[Pi
     blank = np.full((*view.valid.shape, 3), 255, np.uint8)
     errors = [_panel(blank, "signed error: blue too dark, red too bright", size)]
     for name in VARIANTS:
-        picture = evaluated.irradiance[name]
-        shown = runtime.display(view.runtime_radiance(picture), exposure)
+        image = evaluated.irradiance[name]
+        shown = runtime.display(view.runtime_radiance(image), exposure)
         whole.append(_panel(shown, captioned(name, evaluated.metrics[name]), size))
-        shown = runtime.display(picture * view.valid[..., None], light_exposure)
+        shown = runtime.display(image * view.valid[..., None], light_exposure)
         indirect.append(_panel(shown, f"indirect light: {name}", size))
-        signed = signed_error(picture, view.reference.irradiance, view.valid)
+        signed = signed_error(image, view.reference.irradiance, view.valid)
         colors = map_pixels(signed, -1.0, 1.0, DIVERGING, view.valid)
         errors.append(_panel(colors, f"signed error: {name}", size))
     return [np.concatenate(panels, axis=1) for panels in (whole, indirect, errors)]
@@ -89,11 +89,11 @@ def _exposure(radiance: Irradiance, view: CapturedView) -> float:
     return EXPOSURE_KEY / level if level > 0.0 else 1.0
 
 
-def _panel(picture: Image8, caption: str, size: tuple[int, int]) -> Pixels:
-    factor = max(-(-size[0] // picture.shape[1]), -(-size[1] // picture.shape[0]))
-    picture = picture.repeat(factor, axis=0).repeat(factor, axis=1)
-    height, width, _ = picture.shape
+def _panel(image: Image8, caption: str, size: tuple[int, int]) -> Pixels:
+    factor = max(-(-size[0] // image.shape[1]), -(-size[1] // image.shape[0]))
+    image = image.repeat(factor, axis=0).repeat(factor, axis=1)
+    height, width, _ = image.shape
     panel = Image.new("RGB", (width + 2 * _MARGIN, height + _CAPTION + _MARGIN), "white")
-    panel.paste(Image.fromarray(picture), (_MARGIN, _CAPTION))
+    panel.paste(Image.fromarray(image), (_MARGIN, _CAPTION))
     ImageDraw.Draw(panel).text((_MARGIN, 3), caption, fill="black", font=ImageFont.load_default(14))
     return np.asarray(panel)

@@ -1,15 +1,15 @@
-"""The error that is left, split by cause: one term of the picture swapped at a time, and measured again.
+"""The error that is left, split by cause: one term of the image swapped at a time, and measured again.
 
 Every share is the relMSE that goes away with its cause, over the fitted views:
 
-- `noise`: the reference's own, which no picture is without.
-- `finite_n`: with R rotations of the point table, errors E₁ of single pictures and E_R of their mean,
+- `noise`: the reference's own, which no image is without.
+- `finite_n`: with R rotations of the point table, errors E₁ of single images and E_R of their mean,
   infinitely many rotations would leave E = E_R − (E₁ − E_R)/(R − 1): the variance of a mean falls as 1/R.
 - `clamping`: that E, less the error with eight times the VPLs (of clustered discs, at most 4,096), whose
   footprints, and with them the reach of α, are √8 times smaller. (α = 0 in their place would measure the
   bright dots that α is there to prevent.)
-- `visibility`: the tuned picture, less the ceiling's, which is the same VPLs with rays for visibility.
-- `filter`: the runtime's picture, less a plain gather's of the same VPLs.
+- `visibility`: the tuned image, less the ceiling's, which is the same VPLs with rays for visibility.
+- `filter`: the runtime's image, less a plain gather's of the same VPLs.
 - `missing_bounces`: against all bounces, less against one, where all bounces were asked for.
 - `remainder`: what these leave. Causes act on each other, so it may be negative, as may any share whose cause
   makes up for another's.
@@ -37,7 +37,7 @@ MORE_VPLS = 8
 _MOST_VPLS = next(spec.high for spec in ARTIST_PARAMETERS if spec.name == "vpl_count")
 
 
-def error_budget(
+def error_breakdown(
     prepared: PreparedScene,
     evaluation: Evaluation,
     options: SceneOptions,
@@ -69,7 +69,7 @@ def _of_view(
     total = evaluated.metrics["tuned"].relmse
     single, endless = _errors_of_rotations(runtime, view, tuned)
     # More clustered discs than that are drawn as points: another model, and no measure of clamping.
-    most = LARGEST_COUNT if tuned.density_relaxation > 0 else _MOST_VPLS
+    most = LARGEST_COUNT if tuned.lloyd_iterations > 0 else _MOST_VPLS
     many = replace(tuned, vpl_count=int(min(MORE_VPLS * tuned.vpl_count, max(most, tuned.vpl_count))))
     shares = {
         "noise": evaluated.noise_floor,
@@ -80,21 +80,21 @@ def _of_view(
     }
     if one_bounce is not None:
         valid = view.valid & one_bounce.valid
-        picture, less = evaluated.irradiance["tuned"][valid], one_bounce.irradiance[valid]
-        shares["missing_bounces"] = relmse(picture, view.reference.irradiance[valid]) - relmse(picture, less)
+        image, less = evaluated.irradiance["tuned"][valid], one_bounce.irradiance[valid]
+        shares["missing_bounces"] = relmse(image, view.reference.irradiance[valid]) - relmse(image, less)
     return shares | {"remainder": total - sum(shares.values())}
 
 
 def _errors_of_rotations(
     runtime: Runtime, view: CapturedView, parameters: ArtistParameters
 ) -> tuple[float, float]:
-    """relMSE of one picture, on average, and of infinitely many of them."""
+    """relMSE of one image, on average, and of infinitely many of them."""
     runtime.parameters = parameters
     # Evenly over the torus: rotations of a table that lie apart err independently of each other.
     shifts = (np.arange(ROTATIONS)[:, None] * np.array([0.7548776662, 0.5698402910])) % 1.0
-    pictures = [runtime.capture(view.view, (float(u), float(v))).indirect_irradiance for u, v in shifts]
-    single = fmean(_error(view, picture) for picture in pictures)
-    mean = _error(view, np.mean(pictures, axis=0, dtype=np.float64))
+    images = [runtime.capture(view.view, (float(u), float(v))).indirect_irradiance for u, v in shifts]
+    single = fmean(_error(view, image) for image in images)
+    mean = _error(view, np.mean(images, axis=0, dtype=np.float64))
     return single, mean - (single - mean) / (ROTATIONS - 1)
 
 
@@ -104,5 +104,5 @@ def _plain_gather(view: CapturedView, parameters: ArtistParameters) -> np.ndarra
     return surrogate_irradiance(view, parameters, seen)
 
 
-def _error(view: CapturedView, picture: np.ndarray) -> float:
-    return relmse(picture[view.valid], view.reference.irradiance[view.valid])
+def _error(view: CapturedView, image: np.ndarray) -> float:
+    return relmse(image[view.valid], view.reference.irradiance[view.valid])

@@ -35,7 +35,7 @@ _gather = wide_jit(gather)
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedView:
-    """The three pictures of one view and how far each is from the reference."""
+    """The three images of one view and how far each is from the reference."""
 
     view: CapturedView
     tuned: ArtistParameters
@@ -156,13 +156,13 @@ def _evaluate_view(
     ceiling: ArtistParameters,
     visibility: Bool[np.ndarray, "receivers vpls"],
 ) -> EvaluatedView:
-    pictures = {
+    images = {
         "default": runtime_irradiance(runtime, default, view, known),
         "tuned": runtime_irradiance(runtime, tuned, view, known),
         "ceiling": surrogate_irradiance(view, ceiling, visibility),
     }
-    metrics = {name: view.metrics(picture) for name, picture in pictures.items()}
-    return EvaluatedView(view, tuned, pictures, metrics, noise_floor(view.reference))
+    metrics = {name: view.metrics(image) for name, image in images.items()}
+    return EvaluatedView(view, tuned, images, metrics, noise_floor(view.reference))
 
 
 def _visibility(scene: Scene, view: CapturedView) -> Bool[np.ndarray, "receivers vpls"]:
@@ -188,7 +188,7 @@ def surrogate_irradiance(
     repeated = np.arange(count + -count % PIXELS_STEP) % max(count, 1)
     receivers, vpls = gather_inputs(view.captured, repeated)
     seen = None if visibility is None else jnp.asarray(visibility, jnp.float32)[repeated]
-    picture = np.zeros((*valid.shape, 3), np.float32)
+    image = np.zeros((*valid.shape, 3), np.float32)
     gathered = _gather(receivers, vpls, FalloffParameters.of(parameters), seen)
-    picture[valid] = np.asarray(gathered)[:count]
-    return picture
+    image[valid] = np.asarray(gathered)[:count]
+    return image

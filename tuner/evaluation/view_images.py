@@ -1,4 +1,4 @@
-"""pictures.npz: what a fit keeps of its views, so that a report can show them under any exposure.
+"""images.npz: what a fit keeps of its views, so that a report can show them under any exposure.
 
 One file for a fit. For every view that is kept, under the prefix of its place in metrics.json's `per_view`:
 
@@ -46,7 +46,7 @@ _LARGEST_HALF = float(np.finfo(np.float16).max)
 
 
 @dataclass(frozen=True, eq=False)
-class ViewPictures:
+class ViewImages:
     """One view: surfaces, direct light and all the indirect irradiances that were compared.
 
     Irradiance is in units of `level`.
@@ -65,7 +65,7 @@ class ViewPictures:
     """Of `reference` and of each of `VARIANTS`."""
 
     def radiance(self, variant: str) -> Float32[np.ndarray, "height width 3"]:
-        """The whole picture, direct and indirect, in `level`/sr; `variant` may be `reference`."""
+        """The whole image, direct and indirect, in `level`/sr; `variant` may be `reference`."""
         if variant == "reference":
             return radiance(self.reference_albedo, self.reference_direct, self.indirect[variant])
         return radiance(self.albedo, self.direct, self.indirect[variant])
@@ -77,7 +77,7 @@ class ViewPictures:
         return radiance(self.albedo, direct, self.indirect[variant]) * self.valid[..., None]
 
 
-def write_view_pictures(path: Path, views: Sequence[Any]) -> None:
+def write_view_images(path: Path, views: Sequence[Any]) -> None:
     """Write what `tuner.evaluation.evaluate` made of each view (`EvaluatedView`), whole or not at all.
 
     Raises:
@@ -108,23 +108,23 @@ def _members(evaluated: Any) -> dict[str, np.ndarray]:
         **{f"{variant}_indirect": evaluated.irradiance[variant] for variant in VARIANTS},
     }
     relative = {
-        name: np.clip(picture[::step, ::step].astype(np.float64) / level, 0.0, _LARGEST_HALF)
-        for name, picture in irradiances.items()
+        name: np.clip(image[::step, ::step].astype(np.float64) / level, 0.0, _LARGEST_HALF)
+        for name, image in irradiances.items()
     }
     albedos = {"reference_albedo": reference.albedo, "albedo": captured.albedo}
     halves = {**{name: albedo[::step, ::step] for name, albedo in albedos.items()}, **relative}
     return {
         "level": np.array(level, np.float32),
         "valid": valid[::step, ::step],
-        **{name: picture.astype(np.float16) for name, picture in halves.items()},
+        **{name: image.astype(np.float16) for name, image in halves.items()},
     }
 
 
-def read_view_pictures(path: Path) -> tuple[ViewPictures, ...]:
+def read_view_images(path: Path) -> tuple[ViewImages, ...]:
     """The views that `path` holds, in the order of metrics.json; none where there is no such file.
 
     Raises:
-        InputError: not a pictures.npz, or its members do not fit together.
+        InputError: not an images.npz, or its members do not fit together.
     """
     if not path.exists():
         return ()
@@ -132,12 +132,12 @@ def read_view_pictures(path: Path) -> tuple[ViewPictures, ...]:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             members = {name: archive[name] for name in archive.files}
     except _UNREADABLE as error:
-        raise InputError(f"{path}: not a readable pictures.npz ({error})") from error
+        raise InputError(f"{path}: not a readable images.npz ({error})") from error
     indices = sorted({int(name.partition("/")[0]) for name in members if name.partition("/")[0].isdecimal()})
     return tuple(_view(path, index, members) for index in indices)
 
 
-def _view(path: Path, index: int, members: dict[str, np.ndarray]) -> ViewPictures:
+def _view(path: Path, index: int, members: dict[str, np.ndarray]) -> ViewImages:
     def member(name: str) -> np.ndarray:
         if f"{index}/{name}" not in members:
             raise InputError(f"{path}: member {index}/{name} is missing")
@@ -145,21 +145,21 @@ def _view(path: Path, index: int, members: dict[str, np.ndarray]) -> ViewPicture
 
     valid = member("valid")
     if valid.ndim != 2 or not 0 < valid.size <= MAXIMUM_PIXELS or valid.dtype != bool:
-        raise InputError(f"{path}: member {index}/valid must be a picture of at most {MAXIMUM_PIXELS} pixels")
+        raise InputError(f"{path}: member {index}/valid must be an image of at most {MAXIMUM_PIXELS} pixels")
 
-    def picture(name: str) -> np.ndarray:
+    def image(name: str) -> np.ndarray:
         pixels = member(name)
         if pixels.shape != (*valid.shape, 3) or pixels.dtype != np.float16 or not np.isfinite(pixels).all():
             raise InputError(f"{path}: member {index}/{name} must be {valid.shape} finite half floats")
         return pixels.astype(np.float32)
 
-    return ViewPictures(
+    return ViewImages(
         index=index,
         level=float(member("level")),
         valid=valid,
-        reference_albedo=picture("reference_albedo"),
-        reference_direct=picture("reference_direct"),
-        albedo=picture("albedo"),
-        direct=picture("direct"),
-        indirect={name: picture(f"{name}_indirect") for name in ("reference", *VARIANTS)},
+        reference_albedo=image("reference_albedo"),
+        reference_direct=image("reference_direct"),
+        albedo=image("albedo"),
+        direct=image("direct"),
+        indirect={name: image(f"{name}_indirect") for name in ("reference", *VARIANTS)},
     )

@@ -14,12 +14,12 @@ import numpy as np
 from vpltune.renderer.config.artist_parameters import ArtistParameters, placement
 from vpltune.renderer.frame.passes.clustered_discs import LARGEST_COUNT
 from vpltune.renderer.frame.runtime import Runtime
-from vpltune.tuner.fitting.fit_density import with_cells
+from vpltune.tuner.fitting.fit_density import with_discs
 from vpltune.tuner.fitting.fit_views import drawn_cost
 from vpltune.tuner.metrics.robust_error import RobustError
 from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
 
-RELAXATION = 2
+LLOYD_ITERATIONS = 2
 """Lloyd iterations tried with many VPLs. A choice on development scenes:
 eight erred about as little, and took longer."""
 IMPORTANCES = (0.5, 1.0)
@@ -78,13 +78,13 @@ def choose_placement(
 
 def placement_name(parameters: ArtistParameters) -> str:
     """A placement in a few words, for metrics.json."""
-    form = f"discs λ={parameters.density_relaxation}" if parameters.density_relaxation else "points"
+    form = f"discs λ={parameters.lloyd_iterations}" if parameters.lloyd_iterations else "points"
     return f"{form} γ={parameters.density_exponent:g} η={parameters.density_importance:g}"
 
 
 def _placements(start: ArtistParameters) -> list[ArtistParameters]:
     """Those other than the start's own; more VPLs than can be clustered stay points."""
-    clustered = with_cells(start, RELAXATION) if start.vpl_count <= LARGEST_COUNT else start
+    clustered = with_discs(start, LLOYD_ITERATIONS) if start.vpl_count <= LARGEST_COUNT else start
     tried = [
         replace(clustered, density_exponent=1.0, density_importance=importance) for importance in IMPORTANCES
     ]

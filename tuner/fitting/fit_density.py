@@ -1,17 +1,17 @@
 """Fits where few VPLs stand, with all else, to the error that a finite number of them leaves.
 
-Every correctly weighted density has the same mean picture, so none can be learned from it. What is fitted is
+Every correctly weighted density has the same mean image, so none can be learned from it. What is fitted is
 the mean of the loss over several rotations of the point table (Cranley and Patterson 1976), the same ones for
 every candidate (common random numbers): it holds the bias of the falloff and the variance of the placement,
 and at few VPLs the best α, k and κ are others than at many.
 
 Over (γ, η) the loss is measured, along one axis after the other, with falloff and maps fitted at every
 candidate: as density shifts, VPLs cross edges and corners, and in a Cornell box one step of 0.05 in seven
-goes against the smooth trend (row `density_slope_agreement` of `vpltune bench density`). Pictures drawn with
+goes against the smooth trend (row `density_slope_agreement` of `vpltune bench density`). Images drawn with
 the start's falloff would be cheaper to judge by, but where the falloff is what is wrong all densities look
 alike in them.
 
-Every candidate but the start's own has cells (`density_relaxation`): at few VPLs most of the error is that a
+Every candidate but the start's own has cells (`lloyd_iterations`): at few VPLs most of the error is that a
 point shines for all that lies around it, not where shadows fall.
 """
 
@@ -41,9 +41,9 @@ HELD_OUT_ROTATIONS = 8
 FEW_VPLS = 256
 """Up to this many, the fit sees several rotations and the density is fitted; beyond, one placement is as good
 as any other."""
-RELAXATION = 8
+LLOYD_ITERATIONS = 8
 """Steps towards the middles of cells (rows `relaxation_…` of `vpltune bench density`)."""
-CELL_FOOTPRINT = 1.0
+DISC_FOOTPRINT = 1.0
 """α where a fit of cells begins: discs as wide as their cells. Points do best at about half of that."""
 _IMPORTANCES = (0.0, 0.5, 1.0)
 """Of η, at γ = 1; one more between the middle and the better end."""
@@ -65,7 +65,7 @@ class DensityTrial:
 
     density_exponent: float
     density_importance: float
-    density_relaxation: int
+    lloyd_iterations: int
     loss: float
 
 
@@ -116,7 +116,7 @@ def rotation_errors(
     parameters: ArtistParameters,
     rotations: Sequence[Rotation],
 ) -> Float[np.ndarray, "views rotations"]:
-    """relMSE of the runtime's own picture, free of the reference's noise (`tuner.metrics`), by view and
+    """relMSE of the runtime's own image, free of the reference's noise (`tuner.metrics`), by view and
     rotation; 0 where a view is unlit."""
     rotated = rotated_views(runtime, views, parameters, rotations)
     return np.array([_relmse(view) for view in rotated]).reshape(len(views), len(rotations))
@@ -170,17 +170,17 @@ def fit_density(
         return DensityFit(*fits[best()], tuple(trials))
 
     # The start itself is a candidate: the result is never worse than it.
-    own = measure((start.density_exponent, start.density_importance, start.density_relaxation))
+    own = measure((start.density_exponent, start.density_importance, start.lloyd_iterations))
     if own.status.nothing_fitted:
         # Nothing lit, or not finite: no density will mend it.
         return result()
     low, middle, high = _IMPORTANCES
-    losses = [measure((1.0, importance, RELAXATION)).loss for importance in _IMPORTANCES]
-    measure((1.0, (middle + (low if losses[0] < losses[-1] else high)) / 2.0, RELAXATION))
+    losses = [measure((1.0, importance, LLOYD_ITERATIONS)).loss for importance in _IMPORTANCES]
+    measure((1.0, (middle + (low if losses[0] < losses[-1] else high)) / 2.0, LLOYD_ITERATIONS))
     importance = best()[1]
     for exponent in _EXPONENTS:
-        measure((exponent, importance, RELAXATION))
-        if best() != (exponent, importance, RELAXATION):
+        measure((exponent, importance, LLOYD_ITERATIONS))
+        if best() != (exponent, importance, LLOYD_ITERATIONS):
             break
     return result()
 
@@ -207,26 +207,26 @@ def density_document(
     }
 
 
-def with_cells(parameters: ArtistParameters, relaxation: int = RELAXATION) -> ArtistParameters:
+def with_discs(parameters: ArtistParameters, relaxation: int = LLOYD_ITERATIONS) -> ArtistParameters:
     """Cells in place of points, each a disc of its own size; parameters that have cells are as they were."""
-    if parameters.density_relaxation > 0:
+    if parameters.lloyd_iterations > 0:
         return parameters
-    return replace(parameters, density_relaxation=relaxation, falloff_footprint=CELL_FOOTPRINT)
+    return replace(parameters, lloyd_iterations=relaxation, falloff_footprint=DISC_FOOTPRINT)
 
 
 def _with(parameters: ArtistParameters, density: Density) -> ArtistParameters:
     exponent, importance, relaxation = density
     if relaxation > 0:
-        parameters = with_cells(parameters)
+        parameters = with_discs(parameters)
     return replace(
         parameters,
         density_exponent=exponent,
         density_importance=importance,
-        density_relaxation=relaxation,
+        lloyd_iterations=relaxation,
     )
 
 
 def _relmse(view: CapturedView) -> float:
     halves = (half[view.valid] for half in (view.reference.irradiance_a, view.reference.irradiance_b))
-    picture = jnp.asarray(view.captured.indirect_irradiance[view.valid])
-    return float(weighted_squared_error(picture, target_of(*halves)))
+    image = jnp.asarray(view.captured.indirect_irradiance[view.valid])
+    return float(weighted_squared_error(image, target_of(*halves)))

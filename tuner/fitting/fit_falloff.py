@@ -18,7 +18,7 @@ from vpltune.tuner.fitting.descent import STEPS, Residuals, descend
 from vpltune.tuner.fitting.fit_status import Descent, FitStatus
 from vpltune.tuner.fitting.fit_views import FitView
 from vpltune.tuner.fitting.search_space import SearchSpace
-from vpltune.tuner.surrogate.reduced_gather import ReducedGather, reduced_picture
+from vpltune.tuner.surrogate.reduced_gather import ReducedGather, reduced_image
 from vpltune.tuner.surrogate.vpl_gather import FalloffParameters
 
 Data = tuple[ReducedGather, ...]
@@ -68,28 +68,28 @@ def fit_to(
     return tuned, Descent(SearchSpace().point(tuned), min(found.loss, start_loss), start_loss, losses, status)
 
 
-def _pictures_and_targets(falloff: FalloffParameters, data: Data) -> tuple[Array, Array]:
-    pictures = jnp.concatenate([reduced_picture(view, falloff) for view in data])
-    return pictures, jnp.concatenate([view.target for view in data])
+def _images_and_targets(falloff: FalloffParameters, data: Data) -> tuple[Array, Array]:
+    images = jnp.concatenate([reduced_image(view, falloff) for view in data])
+    return images, jnp.concatenate([view.target for view in data])
 
 
-def _projected(pictures: Array, targets: Array) -> Float[Array, ""]:
-    """argmin over k in its range of |k·pictures − targets|²."""
+def _projected(images: Array, targets: Array) -> Float[Array, ""]:
+    """argmin over k in its range of |k·images − targets|²."""
     product = partial(jnp.matmul, precision=jax.lax.Precision.HIGHEST)
     # 1e-30: where no light arrives at all, any k will do.
-    best = product(pictures, targets) / jnp.maximum(product(pictures, pictures), 1e-30)
+    best = product(images, targets) / jnp.maximum(product(images, images), 1e-30)
     return jnp.clip(best, _INTENSITY.low, _INTENSITY.high)
 
 
 @jax.jit
 def _best_intensity(falloff: FalloffParameters, data: Data) -> Float[Array, ""]:
-    return _projected(*_pictures_and_targets(replace(falloff, intensity=jnp.ones(())), data))
+    return _projected(*_images_and_targets(replace(falloff, intensity=jnp.ones(())), data))
 
 
 @jax.jit
 def _squares(falloff: FalloffParameters, data: Data) -> Float[Array, ""]:
-    pictures, targets = _pictures_and_targets(falloff, data)
-    return jnp.sum((pictures - targets) ** 2) / len(data)
+    images, targets = _images_and_targets(falloff, data)
+    return jnp.sum((images - targets) ** 2) / len(data)
 
 
 @lru_cache
@@ -97,8 +97,8 @@ def all_residuals(space: SearchSpace) -> Residuals:
     """Residuals over all of `space`, k like the others; what they are given is the reduced views."""
 
     def residuals(point: Float[Array, " parameters"], data: Data) -> Float[Array, " rows"]:
-        pictures, targets = _pictures_and_targets(FalloffParameters(**space.values(point)), data)
-        return (pictures - targets) / np.sqrt(len(data))
+        images, targets = _images_and_targets(FalloffParameters(**space.values(point)), data)
+        return (images - targets) / np.sqrt(len(data))
 
     return residuals
 
@@ -111,7 +111,7 @@ def _residuals(space: SearchSpace) -> Residuals:
     ) -> Float[Array, " rows"]:
         data, rest = given
         falloff = replace(rest, intensity=jnp.ones(()), **space.values(point))
-        pictures, targets = _pictures_and_targets(falloff, data)
-        return (_projected(pictures, targets) * pictures - targets) / np.sqrt(len(data))
+        images, targets = _images_and_targets(falloff, data)
+        return (_projected(images, targets) * images - targets) / np.sqrt(len(data))
 
     return residuals

@@ -76,7 +76,7 @@ def fit_placement(
     for turn in range(turns):
         if errors is not None:
             ready = [
-                reweighted(view, error, _picture(view.table, current))
+                reweighted(view, error, _image(view.table, current))
                 for view, error in zip(ready, errors, strict=True)
             ]
         current, descent = fit_to(tuple(ready), current, held=held)
@@ -122,14 +122,14 @@ def ready_views(
     for view, error in zip(views, errors, strict=True):
         pixels = view_pixels(view, seed=seed)
         table = pixels.table(parameters)
-        ready.append(pixels.ready(table, error.weights(_picture(table, parameters))))
+        ready.append(pixels.ready(table, error.weights(_image(table, parameters))))
     return tuple(ready)
 
 
 _gather_tabulated = jax.jit(gather_tabulated)
 
 
-def _picture(table: TabulatedGather, parameters: ArtistParameters) -> Float[np.ndarray, "receivers 3"]:
+def _image(table: TabulatedGather, parameters: ArtistParameters) -> Float[np.ndarray, "receivers 3"]:
     return np.asarray(_gather_tabulated(table, FalloffParameters.of(parameters)))
 
 
@@ -137,12 +137,10 @@ def _cost(
     views: Sequence[FitView], errors: Sequence[RobustError] | None, parameters: ArtistParameters
 ) -> float:
     """The mean over views: of the robust error, or of relMSE without the reference's noise."""
-    pictures = [_picture(view.table, parameters) for view in views]
+    images = [_image(view.table, parameters) for view in views]
     if errors is None:
         targets = [view.target for view in views]
         return float(
-            np.mean(
-                [weighted_squared_error(jnp.asarray(y), t) for y, t in zip(pictures, targets, strict=True)]
-            )
+            np.mean([weighted_squared_error(jnp.asarray(y), t) for y, t in zip(images, targets, strict=True)])
         )
-    return float(np.mean([error.cost(y) for y, error in zip(pictures, errors, strict=True)]))
+    return float(np.mean([error.cost(y) for y, error in zip(images, errors, strict=True)]))

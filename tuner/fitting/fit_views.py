@@ -145,8 +145,8 @@ def fit_view_of_table(
     return FitView(table, target, reduce_gather(table, target), jnp.asarray(tile, jnp.int32))
 
 
-def reweighted(view: FitView, error: RobustError, picture: Float[np.ndarray, "receivers 3"]) -> FitView:
+def reweighted(view: FitView, error: RobustError, image: Float[np.ndarray, "receivers 3"]) -> FitView:
     """The same view with the weights that the errors of an image ask for: the next step of a robust fit."""
-    weight = jnp.asarray(error.weights(picture), jnp.float32)
+    weight = jnp.asarray(error.weights(image), jnp.float32)
     target = replace(view.target, weight=weight)
     return replace(view, target=target, reduced=reduce_gather(view.table, target))

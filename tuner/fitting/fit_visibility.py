@@ -106,8 +106,8 @@ def residuals(
     values = SPACE.values(point)
     parameters = VisibilityParameters(values["visibility_bias"], values["visibility_softness"])
     seen = jnp.concatenate([jnp.ones(1), seen_share(jnp.asarray(overlap_nodes()), parameters)])
-    pictures = [jnp.matmul(view.factor, seen, precision="highest") - view.target for view in views]
-    return jnp.concatenate(pictures) / np.sqrt(len(views))
+    images = [jnp.matmul(view.factor, seen, precision="highest") - view.target for view in views]
+    return jnp.concatenate(images) / np.sqrt(len(views))
 
 
 def overlap_nodes() -> Float[np.ndarray, " nodes"]:
@@ -150,7 +150,7 @@ def _sums(
     def of_chunk(chunk: tuple[Array, Array, Array]) -> Float[Array, "chunk 3 columns"]:
         position, normal, overlap = chunk
         squared, form_at = pair_forms(Receivers(position, normal), vpls, axes)
-        transmittance = jnp.exp(-falloff.falloff_transmittance * jnp.sqrt(squared))
+        transmittance = jnp.exp(-falloff.extinction_coefficient * jnp.sqrt(squared))
         form = falloff.intensity / jnp.pi * form_at(falloff.falloff_footprint) * transmittance
         # Along the nodes, from 0; what is always seen lies on a place of its own.
         place = jnp.where(overlap > _LEAST, jnp.log(jnp.maximum(overlap, _LEAST) / _LEAST) / step, -1.0)

@@ -16,7 +16,7 @@ FALLOFF_SPECS = tuple(spec for spec in ARTIST_PARAMETERS if spec.fitted and spec
 
 def held_for(visibility: Visibility) -> frozenset[str]:
     """Parameters that the runtime does not look at with `visibility`, and a fit must not move."""
-    return frozenset({"falloff_transmittance"}) if visibility == "none" else frozenset()
+    return frozenset({"extinction_coefficient"}) if visibility == "none" else frozenset()
 
 
 @dataclass(frozen=True)

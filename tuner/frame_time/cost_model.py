@@ -160,7 +160,7 @@ def costs_key(renderer: str, scene: Scene, views: Sequence[View], config: TunedC
     """Hash of all that a frame's costs depend on."""
     parts = [_FORMAT, renderer, shaders_digest(), scene_digest(scene), config.visibility]
     parts += [config.parameters.density_importance > 0.0, config.parameters.screen_space_strength > 0.0]
-    parts += [config.parameters.density_relaxation]
+    parts += [config.parameters.lloyd_iterations]
     for view in views:
         parts += [view.size, view.camera.to_world.tolist(), view.camera.yfov]
         parts += [

@@ -1,4 +1,4 @@
-"""The best picture within a frame's time: from the cost model, then settled and verified in the runtime."""
+"""The best image within a frame's time: from the cost model, then settled and verified in the runtime."""
 
 import hashlib
 import importlib.metadata
@@ -23,7 +23,7 @@ from vpltune.tuner.fitting.fit_density import (
     rotated_views,
     rotation_errors,
     table_rotations,
-    with_cells,
+    with_discs,
 )
 from vpltune.tuner.fitting.fit_placement import fit_placement
 from vpltune.tuner.fitting.fit_status import Descent
@@ -125,7 +125,7 @@ class FrameBudget:
         # A view that no light reaches says nothing of errors, and takes its time all the same.
         self._views = tuple(view for view in fitted if view.lit)
         self._timed = tuple(replace(view.view, size=frame_size) for view in fitted)
-        guessed = replace(with_cells(start.parameters), density_importance=GUESSED_IMPORTANCE)
+        guessed = replace(with_discs(start.parameters), density_importance=GUESSED_IMPORTANCE)
         self._start = replace(start, parameters=guessed)
         self._runtimes: dict[FrameChoice, Runtime] = {}
         self.default_choice = default_choice(self._timed[0])

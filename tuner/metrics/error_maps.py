@@ -1,6 +1,6 @@
-"""Pictures of where the error is: signed error of irradiance, and HDR-FLIP of the whole picture.
+"""Images of where the error is: signed error of irradiance, and HDR-FLIP of the whole image.
 
-Both are palette pictures, so that a map weighs a byte a pixel, and what is not valid is transparent.
+Both are palette images, so that a map weighs a byte a pixel, and what is not valid is transparent.
 """
 
 import io
@@ -52,10 +52,10 @@ def map_png(
     """`values` from `low` to `high` in `colours`, beyond them in the end colours, as a PNG file."""
     share = (np.clip(values, low, high) - low) / (high - low)
     indices = np.round(share * (_LEVELS - 1)).astype(np.uint8)
-    picture = Image.fromarray(np.where(valid, indices, np.uint8(_TRANSPARENT)))
-    picture.putpalette(_palette(colours))
+    image = Image.fromarray(np.where(valid, indices, np.uint8(_TRANSPARENT)))
+    image.putpalette(_palette(colours))
     file = io.BytesIO()
-    picture.save(file, "PNG", transparency=_TRANSPARENT, optimize=True)
+    image.save(file, "PNG", transparency=_TRANSPARENT, optimize=True)
     return file.getvalue()
 
 

@@ -56,6 +56,6 @@ def target_of(
     return Target(*(jnp.asarray(values, jnp.float32) for values in (half_a, half_b, weight)))
 
 
-def weighted_squared_error(picture: Float[Array, "receivers 3"], target: Target) -> Float[Array, ""]:
+def weighted_squared_error(image: Float[Array, "receivers 3"], target: Target) -> Float[Array, ""]:
     """Σ weight·(y − a)(y − b): what one step of a fit minimises."""
-    return jnp.sum(target.weight * (picture - target.half_a) * (picture - target.half_b))
+    return jnp.sum(target.weight * (image - target.half_a) * (image - target.half_b))

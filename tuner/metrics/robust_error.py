@@ -45,21 +45,21 @@ class RobustError:
     scale: float
     """s, relative."""
 
-    def costs(self, picture: Float[np.ndarray, "receivers 3"]) -> Float64[np.ndarray, " receivers"]:
+    def costs(self, image: Float[np.ndarray, "receivers 3"]) -> Float64[np.ndarray, " receivers"]:
         """ρ at every receiver for an image y [W/m²]."""
-        return 2.0 * self.scale**2 * (np.hypot(1.0, self._error(picture) / self.scale) - 1.0)
+        return 2.0 * self.scale**2 * (np.hypot(1.0, self._error(image) / self.scale) - 1.0)
 
-    def cost(self, picture: Float[np.ndarray, "receivers 3"]) -> float:
+    def cost(self, image: Float[np.ndarray, "receivers 3"]) -> float:
         """The mean of ρ over the receivers for an image y [W/m²]; 0 without receivers."""
-        return float(self.costs(picture).mean()) if len(picture) else 0.0
+        return float(self.costs(image).mean()) if len(image) else 0.0
 
-    def weights(self, picture: Float[np.ndarray, "receivers 3"]) -> Float64[np.ndarray, "receivers 3"]:
+    def weights(self, image: Float[np.ndarray, "receivers 3"]) -> Float64[np.ndarray, "receivers 3"]:
         """What each value of the image weighs in the next least-squares step, over the number of values."""
-        robust = 1.0 / np.hypot(1.0, self._error(picture) / self.scale)
+        robust = 1.0 / np.hypot(1.0, self._error(image) / self.scale)
         return self.weight * robust[:, None] / max(self.weight.size, 1)
 
-    def _error(self, picture: Float[np.ndarray, "receivers 3"]) -> Float64[np.ndarray, " receivers"]:
-        return np.sqrt((self.weight * (picture.astype(np.float64) - self.reference) ** 2).mean(axis=1))
+    def _error(self, image: Float[np.ndarray, "receivers 3"]) -> Float64[np.ndarray, " receivers"]:
+        return np.sqrt((self.weight * (image.astype(np.float64) - self.reference) ** 2).mean(axis=1))
 
 
 def robust_error(

@@ -8,7 +8,7 @@ from vpltune.renderer.files.srgb import srgb_from_linear
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
-def display_picture(
+def display_image(
     linear: Float[np.ndarray, "height width 3"], exposure: float
 ) -> UInt8[np.ndarray, "height width 3"]:
     """`linear` times `exposure`, through the tone curve and encoded as sRGB."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 from statistics import fmean
 
 # FLIP's threads spin while they wait for each other: on a busy machine two of them took ten times as long
-# as one for pictures of this size. Read once, when its library is loaded.
+# as one for images of this size. Read once, when its library is loaded.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import flip_evaluator
@@ -51,20 +51,20 @@ class ViewMetrics:
         return figures
 
 
-def relmse(picture: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:
+def relmse(image: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:
     """Relative mean squared error; NaN against a black reference."""
-    errors = squared_errors(picture, reference)
+    errors = squared_errors(image, reference)
     return float(errors.mean()) if errors.size else math.nan
 
 
 def trimmed_relmse(
-    picture: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]
+    image: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]
 ) -> tuple[float, float]:
     """relMSE without the worst `WORST_SHARE` of the pixels, and the share of it that those hold.
 
     One pixel is always kept. Both are NaN against a black reference, the share 0 where there is no error.
     """
-    errors = np.sort(squared_errors(picture, reference))
+    errors = np.sort(squared_errors(image, reference))
     if not errors.size:
         return math.nan, math.nan
     kept = errors[: max(1, len(errors) - math.ceil(WORST_SHARE * len(errors)))]
@@ -73,47 +73,47 @@ def trimmed_relmse(
 
 
 def squared_errors(
-    picture: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]
+    image: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]
 ) -> Float64[np.ndarray, " measured"]:
     """What each pixel adds to the relMSE, times their number; none against a black reference."""
-    y, r = picture.astype(np.float64), reference.astype(np.float64)
+    y, r = image.astype(np.float64), reference.astype(np.float64)
     denominator = r**2 + DARK_SHARE * r.mean() ** 2 if r.size else r
     return ((y - r) ** 2 / denominator).mean(axis=1) if denominator.any() else np.zeros(0)
 
 
-def median_error(picture: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:
+def median_error(image: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:
     """The median relative error over the pixels that light reaches; NaN where it reaches none."""
-    y, r = picture.astype(np.float64), reference.astype(np.float64)
+    y, r = image.astype(np.float64), reference.astype(np.float64)
     level = r.sum(axis=1)
     lit = level > 0.0
     return float(np.median(np.abs(y - r).sum(axis=1)[lit] / level[lit])) if lit.any() else math.nan
 
 
-def energy_ratio(picture: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:
-    """Mean of the picture over mean of the reference; NaN against a black reference."""
+def energy_ratio(image: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:
+    """Mean of the image over mean of the reference; NaN against a black reference."""
     mean = float(reference.mean(dtype=np.float64)) if reference.size else 0.0
-    return float(picture.mean(dtype=np.float64)) / mean if mean > 0.0 else math.nan
+    return float(image.mean(dtype=np.float64)) / mean if mean > 0.0 else math.nan
 
 
 def hdr_flip(
-    picture: Float[np.ndarray, "height width 3"], reference: Float[np.ndarray, "height width 3"]
+    image: Float[np.ndarray, "height width 3"], reference: Float[np.ndarray, "height width 3"]
 ) -> float:
-    """Mean HDR-FLIP of two radiance pictures, its exposures chosen from the reference; 0 if both are black.
+    """Mean HDR-FLIP of two radiance images, its exposures chosen from the reference; 0 if both are black.
 
-    FLIP's exposures follow from the reference's brightest and median luminance, so both pictures are first
+    FLIP's exposures follow from the reference's brightest and median luminance, so both images are first
     divided by the reference's mean: the result depends on neither light units nor scale.
     """
-    return float(hdr_flip_map(picture, reference).mean(dtype=np.float64))
+    return float(hdr_flip_map(image, reference).mean(dtype=np.float64))
 
 
 def hdr_flip_map(
-    picture: Float[np.ndarray, "height width 3"], reference: Float[np.ndarray, "height width 3"]
+    image: Float[np.ndarray, "height width 3"], reference: Float[np.ndarray, "height width 3"]
 ) -> Float[np.ndarray, "height width"]:
     """HDR-FLIP of every pixel, in [0, 1]; see `hdr_flip`, its mean."""
     level = float(reference.mean(dtype=np.float64))
     if level <= 0.0:
-        return np.full(picture.shape[:2], 1.0 if picture.any() else 0.0, np.float32)
-    scaled = [np.ascontiguousarray(image / level, np.float32) for image in (reference, picture)]
+        return np.full(image.shape[:2], 1.0 if image.any() else 0.0, np.float32)
+    scaled = [np.ascontiguousarray(image / level, np.float32) for image in (reference, image)]
     with np.errstate(all="ignore"):
         errors, _, _ = flip_evaluator.evaluate(scaled[0], scaled[1], "HDR", applyMagma=False)
     return errors[..., 0]

@@ -1,6 +1,6 @@
 """A captured view's loss as a table over all that a prior sets: a training step then costs a look-up.
 
-With y the picture at intensity 1, the loss Σ w (ky − a)(ky − b) is A k² − B k + C with A = Σ w y²,
+With y the image at intensity 1, the loss Σ w (ky − a)(ky − b) is A k² − B k + C with A = Σ w y²,
 B = Σ w y (a + b) and C = Σ w a b, so only A and B depend on the other parameters, and they are smooth in
 them. They are tabulated over α, β and σ through the surrogate (`tuner.surrogate.vpl_gather`, `tuner.surrogate.vpl_visibility`)
 and interpolated: cubic in α, linear in β and σ.
@@ -78,7 +78,7 @@ def loss_table(
     target = target_of(*halves, weight)
     maps = view.captured.visibility_maps
     overlap = None if maps is None else surface_overlap(receivers, vpls, map_texels(maps))
-    square, product = _sums(receivers, vpls, overlap, jnp.float32(parameters.falloff_transmittance), target)
+    square, product = _sums(receivers, vpls, overlap, jnp.float32(parameters.extinction_coefficient), target)
     constant = np.sum(np.asarray(target.weight * target.half_a * target.half_b, np.float64))
     return LossTable(np.asarray(square), np.asarray(product), np.array(constant, np.float32))
 
@@ -98,9 +98,9 @@ def _sums(
     )
 
     def at(footprint: Array, seen: Array | None) -> tuple[Array, Array]:
-        picture = gather(receivers, vpls, FalloffParameters(jnp.ones(()), footprint, transmittance), seen)
-        weighed = target.weight * picture
-        return jnp.sum(weighed * picture), jnp.sum(weighed * (target.half_a + target.half_b))
+        image = gather(receivers, vpls, FalloffParameters(jnp.ones(()), footprint, transmittance), seen)
+        weighed = target.weight * image
+        return jnp.sum(weighed * image), jnp.sum(weighed * (target.half_a + target.half_b))
 
     def at_all_footprints(node: tuple[Array, Array]) -> tuple[Array, Array]:
         seen = None if overlap is None else seen_share(overlap, VisibilityParameters(*node))

@@ -64,7 +64,7 @@ class PriorScene:
     table: LossTable
     """Of the loss that fits have."""
     relmse_table: LossTable
-    """Of relMSE alone, which pictures are judged by."""
+    """Of relMSE alone, which images are judged by."""
     vpl_count: Int32[np.ndarray, " rows"]
     fitted: Bool[np.ndarray, " rows"]
     """Whether the row's view is one that a fit may see."""

@@ -80,17 +80,17 @@ class IndirectIrradiance:
         width, height = self._size
         valid = self._wavefront.to_numpy(self._seen.hit)[: width * height].reshape(height, width)
 
-        def picture(vectors) -> Float32[np.ndarray, "height width 3"]:
+        def image(vectors) -> Float32[np.ndarray, "height width 3"]:
             values = self._wavefront.to_numpy(vectors)[: width * height].reshape(height, width, 3)
             return np.where(valid[..., None], values, np.float32(0.0))
 
-        position = picture(self._seen.position).astype(np.float64) * triangles.diagonal
+        position = image(self._seen.position).astype(np.float64) * triangles.diagonal
         return PrimaryHits(
             valid=valid,
             position_world=np.where(valid[..., None], position + triangles.center_world, 0.0),
-            normal_world=picture(self._seen.shading_normal),
-            albedo=picture(self._seen.albedo),
-            direct_irradiance=picture(direct),
+            normal_world=image(self._seen.shading_normal),
+            albedo=image(self._seen.albedo),
+            direct_irradiance=image(direct),
         )
 
     def batches(

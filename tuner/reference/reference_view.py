@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float32, Float64
 class ReferenceView:
     """Irradiance in W/m² at the centres of a view's pixels, row 0 at the top.
 
-    Pictures are zero where a pixel sees no surface. Positions and lengths are in world units.
+    Images are zero where a pixel sees no surface. Positions and lengths are in world units.
     """
 
     irradiance_a: Float32[np.ndarray, "height width 3"]

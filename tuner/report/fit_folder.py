@@ -5,10 +5,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from vpltune.renderer.config.config_versions import OLDER_NAMES
 from vpltune.renderer.errors import InputError
-from vpltune.tuner.evaluation.view_images import ViewPictures, read_view_pictures
+from vpltune.tuner.evaluation.view_images import ViewImages, read_view_images
 
 METRICS = "metrics.json"
+IMAGES = "images.npz"
+_OLDER_IMAGES = "pictures.npz"
+"""The name of the same file in version 0.1.0."""
+_PRESENT_NAMES = {**OLDER_NAMES, "error_budget": "error_breakdown"}
+"""Keys that version 0.1.0 wrote, to those of today."""
 _KINDS = {
     "parameters": dict,
     "metrics": dict,
@@ -16,7 +22,7 @@ _KINDS = {
     "loss": dict,
     "provenance": dict,
     "uncertainty": dict,
-    "error_budget": dict,
+    "error_breakdown": dict,
     "budget": dict,
     "per_view": list,
     "notes": list,
@@ -33,7 +39,7 @@ class FitFolder:
     path: Path
     document: dict[str, Any]
     """metrics.json; numbers within may be null."""
-    pictures: tuple[ViewPictures, ...]
+    images: tuple[ViewImages, ...]
 
     def part(self, key: str) -> Any:
         """The object or list under `key`, empty where the fit made none."""
@@ -45,12 +51,12 @@ def is_fit_folder(path: Path) -> bool:
 
 
 def read_fit_folder(path: Path) -> FitFolder:
-    """Read metrics.json and pictures.npz below `path`.
+    """Read metrics.json and images.npz below `path`.
 
     Raises:
         InputError: a file cannot be read, is not what its name says, or a key holds another kind of value.
     """
-    document = read_json_object(path / METRICS)
+    document = _with_present_names(read_json_object(path / METRICS))
     for key, kind in _KINDS.items():
         value = document.get(key)
         if value is not None and not isinstance(value, kind):
@@ -60,7 +66,15 @@ def read_fit_folder(path: Path) -> FitFolder:
             for member in value.values() if isinstance(value, dict) else value or ():
                 if not isinstance(member, dict):
                     raise InputError(f"{path / METRICS}: key '{key}' must hold objects, got {member!r:.60}")
-    return FitFolder(path, document, read_view_pictures(path / "pictures.npz"))
+    images = path / IMAGES
+    return FitFolder(path, document, read_view_images(images if images.exists() else path / _OLDER_IMAGES))
+
+
+def _with_present_names(value: Any) -> Any:
+    """`value` with the names of today wherever version 0.1.0 wrote others."""
+    if isinstance(value, dict):
+        return {_PRESENT_NAMES.get(key, key): _with_present_names(each) for key, each in value.items()}
+    return [_with_present_names(each) for each in value] if isinstance(value, list) else value
 
 
 def read_json_object(path: Path) -> dict[str, Any]:

@@ -151,16 +151,16 @@ def _within_size(rows: list[TunedRow], untuned: list[UntunedRow]) -> tuple[list[
     """The worst rows, as many as the page may hold, and how many are left out; thumbnails go first."""
     room = MAXIMUM_PAGE_BYTES - _REST_OF_PAGE - (MAXIMUM_PAGE_BYTES // 5 if untuned else 0)
     # Half of the page for thumbnails: the other half holds thousands of rows without.
-    pictures, shown = room // 2, []
+    images, shown = room // 2, []
     for row in rows:
         weight = sum(len(address) for address in row.thumbnails.values())
         # Escaped, a character may take six bytes; a name stands in a row three times.
         words = _ROW_BYTES + 18 * len(row.name) + 6 * len(row.sentence)
-        if weight > pictures:
+        if weight > images:
             row, weight = replace(row, thumbnails={}), 0
         if words + weight > room:
             break
-        pictures -= weight
+        images -= weight
         room -= words + weight
         shown.append(row)
     return shown, len(rows) - len(shown)

@@ -9,10 +9,10 @@ from PIL import Image
 
 from vpltune.tuner.batch.record import Record
 from vpltune.tuner.evaluation.view_images import VARIANTS
-from vpltune.tuner.metrics.tone_curve import display_picture
+from vpltune.tuner.metrics.tone_curve import display_image
 from vpltune.tuner.report.fit_folder import FitFolder, split_figures
 from vpltune.tuner.report.page_text import finite
-from vpltune.tuner.report.view_blocks import picture_exposure
+from vpltune.tuner.report.view_blocks import image_exposure
 
 THUMBNAIL_WIDTH = 120
 
@@ -33,7 +33,7 @@ class TunedRow:
     """How the fit ended: `improved`, `kept` or `doubtful`; empty where that is not known."""
     sentence: str
     thumbnails: dict[str, str]
-    """data: addresses of `reference`, `default` and `tuned`; empty where the fit kept no pictures."""
+    """data: addresses of `reference`, `default` and `tuned`; empty where the fit kept no images."""
 
     @property
     def ratio(self) -> float | None:
@@ -86,21 +86,21 @@ def _thumbnails(fit: FitFolder, split: str) -> dict[str, str]:
     measured = fit.part("per_view")
     of_split = [
         view
-        for view in fit.pictures
+        for view in fit.images
         if view.index < len(measured) and measured[view.index].get("split") == split
     ]
-    if not fit.pictures:
+    if not fit.images:
         return {}
-    view = (of_split or list(fit.pictures))[0]
-    exposure = picture_exposure(view)
+    view = (of_split or list(fit.images))[0]
+    exposure = image_exposure(view)
     return {
-        name: _thumbnail(display_picture(view.radiance(name), exposure))
+        name: _thumbnail(display_image(view.radiance(name), exposure))
         for name in ("reference", "default", "tuned")
     }
 
 
-def _thumbnail(picture: Any) -> str:
-    image = Image.fromarray(picture)
+def _thumbnail(image: Any) -> str:
+    image = Image.fromarray(image)
     height = max(1, round(THUMBNAIL_WIDTH * image.height / image.width))
     file = io.BytesIO()
     image.resize((THUMBNAIL_WIDTH, height), Image.Resampling.LANCZOS).save(file, "JPEG", quality=85)

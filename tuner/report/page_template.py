@@ -57,7 +57,7 @@ def _source(name: str) -> str:
 
 
 def _policy(css: str, javascript: str) -> str:
-    """Content security policy: our own style and script, pictures that lie in the page, and nothing else."""
+    """Content security policy: our own style and script, images that lie in the page, and nothing else."""
     style, script = (
         base64.b64encode(hashlib.sha256(text.encode("utf-8")).digest()).decode("ascii")
         for text in (css, javascript)

@@ -1,4 +1,4 @@
-"""The page of one fit: pictures, figures, parameters, and how they came about."""
+"""The page of one fit: images, figures, parameters, and how they came about."""
 
 from collections.abc import Mapping
 from pathlib import PurePath
@@ -32,9 +32,9 @@ VISIBILITY_WORDS = {
     "transmittance": "mean transmittance for visibility",
     "maps": "visibility maps",
 }
-_NO_PICTURES = "This fit kept no pictures (pictures.npz), so there is nothing to show here."
+_NO_IMAGES = "This fit kept no images (images.npz), so there is nothing to show here."
 _REST_OF_PAGE = 600_000
-"""Bytes kept for everything but pictures: tables, curve, style and script."""
+"""Bytes kept for everything but images: tables, curve, style and script."""
 
 
 def scene_page(fit: FitFolder, name: str | None = None, library: str | None = None) -> str:
@@ -46,7 +46,7 @@ def scene_page(fit: FitFolder, name: str | None = None, library: str | None = No
     """
     document = fit.document
     views, left_out = _views(fit)
-    budget, budget_views = _error_budget(fit.part("error_budget"))
+    budget, budget_views = _error_breakdown(fit.part("error_breakdown"))
     front = fit.part("pareto")
     return page_html(
         "scene.html.j2",
@@ -61,7 +61,7 @@ def scene_page(fit: FitFolder, name: str | None = None, library: str | None = No
         visibility=VISIBILITY_WORDS.get(str(document.get("visibility")), str(document.get("visibility", ""))),
         views=views,
         left_out=left_out,
-        no_pictures=_NO_PICTURES,
+        no_images=_NO_IMAGES,
         linear=[view.linear for view in views],
         SHOWN=SHOWN,
         diverging=DIVERGING,
@@ -78,7 +78,7 @@ def scene_page(fit: FitFolder, name: str | None = None, library: str | None = No
         ),
         frame_budget=_frame_budget(fit.part("budget")),
         pareto_rows=[_front_row(point) for point in front],
-        error_budget=budget,
+        error_breakdown=budget,
         budget_views=budget_views,
         timings=_timings(fit.part("seconds")),
         notes=[str(note) for note in fit.part("notes")],
@@ -95,18 +95,18 @@ def _views(fit: FitFolder) -> tuple[list[ViewBlock], str]:
     """What is shown, and a sentence on what was left out for the page's size."""
     measured = fit.part("per_view")
     room, shown = MAXIMUM_PAGE_BYTES - _REST_OF_PAGE, []
-    for pictures in fit.pictures:
-        block = view_block(pictures, measured[pictures.index] if pictures.index < len(measured) else {})
+    for images in fit.images:
+        block = view_block(images, measured[images.index] if images.index < len(measured) else {})
         if block.weight > room:
             break
         room -= block.weight
         shown.append(block)
-    missing = max(len(measured), len(fit.pictures)) - len(shown)
+    missing = max(len(measured), len(fit.images)) - len(shown)
     if not shown or not missing:
         return shown, ""
     return (
         shown,
-        f"{missing} more views were measured: with their pictures the page would be too large.",
+        f"{missing} more views were measured: with their images the page would be too large.",
     )
 
 
@@ -150,7 +150,7 @@ def _figure_rows(figures: Mapping[str, Any]) -> list[dict[str, str]]:
     return [*rows, {"variant": "noise floor", **floor}]
 
 
-def _error_budget(budget: Mapping[str, Any]) -> tuple[BarChart | None, str]:
+def _error_breakdown(budget: Mapping[str, Any]) -> tuple[BarChart | None, str]:
     """Bars of the causes, the greatest first, and the views that they were measured on."""
     causes = {name: value for name, raw in budget.items() if (value := finite(raw)) is not None}
     views = str(budget.get("views", "")).replace("_", " ")

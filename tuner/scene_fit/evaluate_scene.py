@@ -6,7 +6,7 @@ from typing import Any
 
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.scene.views import write_views
-from vpltune.tuner.evaluation.error_breakdown import error_budget
+from vpltune.tuner.evaluation.error_breakdown import error_breakdown
 from vpltune.tuner.evaluation.evaluate import Evaluation, evaluate
 from vpltune.tuner.evaluation.prepare_scene import Progress, SceneOptions, Stopwatch, prepare_scene
 from vpltune.tuner.reference.cache import cache_folder
@@ -51,7 +51,7 @@ def evaluate_scene(scene_path: Path, options: EvaluateOptions, progress: Progres
     budget = {}
     if options.split_error:
         with watch.stage("split error"):
-            budget["error_budget"] = error_budget(
+            budget["error_breakdown"] = error_breakdown(
                 prepared,
                 evaluation,
                 options,

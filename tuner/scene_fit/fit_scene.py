@@ -19,7 +19,7 @@ from vpltune.renderer.files.strict_json import strict_json
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.views import write_views
 from vpltune.tuner.evaluation.comparison_image import write_comparison
-from vpltune.tuner.evaluation.error_breakdown import error_budget
+from vpltune.tuner.evaluation.error_breakdown import error_breakdown
 from vpltune.tuner.evaluation.evaluate import Evaluation, evaluate
 from vpltune.tuner.evaluation.evidence import doubts, undetermined
 from vpltune.tuner.evaluation.guard import Verdict, verdict
@@ -31,7 +31,7 @@ from vpltune.tuner.evaluation.prepare_scene import (
     prepare_scene,
 )
 from vpltune.tuner.evaluation.validation import candidates, validation_metrics
-from vpltune.tuner.evaluation.view_images import write_view_pictures
+from vpltune.tuner.evaluation.view_images import write_view_images
 from vpltune.tuner.fitting.fit_density import table_rotations
 from vpltune.tuner.fitting.fit_status import Descent, FitStatus, Outcome
 from vpltune.tuner.fitting.search_space import SearchSpace
@@ -87,7 +87,7 @@ def fit(
 
     Args:
         scene: a glTF, OBJ or PLY file.
-        output: the folder for tuned.json, views.json, metrics.json, pictures.npz and comparison.png.
+        output: the folder for tuned.json, views.json, metrics.json, images.npz and comparison.png.
         config: where the fit starts: a config file, or "default".
         progress: called with a stage's name and the share of it that is done, in [0, 1].
         options: fields of `tuner.evaluation.prepare_scene.SceneOptions`: views, seed, bounces, camera, light, size …
@@ -101,7 +101,7 @@ def fit(
 
 
 def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Progress) -> FitResult:
-    """Fit a scene; write tuned.json, views.json, metrics.json, pictures.npz and comparison.png to `output`.
+    """Fit a scene; write tuned.json, views.json, metrics.json, images.npz and comparison.png to `output`.
 
     Every file is written whole, and only once the fit and its measurement are done. References are kept
     in the user's cache as they are made, so a run that was stopped goes on where it was.
@@ -126,14 +126,14 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
     budget = {}
     if options.split_error:
         with watch.stage("split error"):
-            budget["error_budget"] = error_budget(
+            budget["error_breakdown"] = error_breakdown(
                 prepared, evaluation, options, lambda share: progress("split error", share)
             )
     config = _config(prepared, found, options)
     views = (*(view.view for view in prepared.views), *(view for view, _ in prepared.validation))
     write_views(output / "views.json", str(scene_path), views)
     write_comparison(output / "comparison.png", prepared.runtime, evaluation.most_and_least_gained())
-    write_view_pictures(output / "pictures.npz", evaluation.views)
+    write_view_images(output / "images.npz", evaluation.views)
     write_config(output / "tuned.json", config)
     notes = (*prepared.notes, *evaluation.notes(), *found.notes)
     descent = found.descent
@@ -294,7 +294,7 @@ def _auto_candidate(
 
     None where it was not trained for it: with clustered discs, or without maps.
     """
-    if start.density_relaxation > 0 or options.start.visibility != "maps" or options.start.auto is not None:
+    if start.lloyd_iterations > 0 or options.start.visibility != "maps" or options.start.auto is not None:
         return None
     prior = read_config("auto").auto
     statistics = [
@@ -341,7 +341,7 @@ def fit_start(config: TunedConfig, drawn: Sequence[ArtistParameters]) -> ArtistP
     """The config's parameters; of a prior, the mean in the unit cube of what views were drawn with."""
     if config.visibility == "none":
         # What the runtime does not look at shall not look as if it did.
-        return replace(config.parameters, falloff_transmittance=0.0)
+        return replace(config.parameters, extinction_coefficient=0.0)
     return config.parameters if config.auto is None else _mean_parameters(config.parameters, drawn)
 
 

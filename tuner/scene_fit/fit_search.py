@@ -9,7 +9,7 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene
 from vpltune.tuner.fitting.choose_placement import choose_placement
-from vpltune.tuner.fitting.fit_density import density_document, fit_density, with_cells
+from vpltune.tuner.fitting.fit_density import density_document, fit_density, with_discs
 from vpltune.tuner.fitting.fit_placement import fit_placement, ready_views
 from vpltune.tuner.fitting.fit_status import Descent
 from vpltune.tuner.fitting.fit_views import robust_errors
@@ -106,9 +106,9 @@ def _recaptured(
         density_exponent=tuned.density_exponent,
         density_importance=tuned.density_importance,
     )
-    if tuned.density_relaxation > 0:
+    if tuned.lloyd_iterations > 0:
         # Discs begin at α = 1, whatever the start's points had; a start with discs keeps its α.
-        base = replace(with_cells(base), density_relaxation=tuned.density_relaxation)
+        base = replace(with_discs(base), lloyd_iterations=tuned.lloyd_iterations)
     prepared.runtime.parameters = tuned
     captured = capture_views(
         prepared.runtime, tuple(view.view for view in views), tuple(view.reference for view in views)

@@ -31,7 +31,7 @@ ROUNDING = 1e-7
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class ReducedGather:
-    """One view. |picture − target|² + offset is its loss."""
+    """One view. |image − target|² + offset is its loss."""
 
     factor: Float[Array, "rows nodes"]
     target: Float[Array, " rows"]
@@ -47,7 +47,7 @@ def reduce_gather(table: TabulatedGather, target: Target) -> ReducedGather:
 def reduce_columns(
     irradiance: Float[Array, "receivers 3 nodes"], target: Target
 ) -> tuple[Float[Array, "rows nodes"], Float[Array, " rows"], Float[Array, ""]]:
-    """Factor, target and offset of the least-squares problem for any picture `irradiance` · x."""
+    """Factor, target and offset of the least-squares problem for any image `irradiance` · x."""
     chunks, offset = _gram(irradiance, target)
     gram = np.asarray(chunks, np.float64).sum(axis=0)
     # Of a semidefinite matrix (Higham 1990), and twenty times sooner than its eigenvectors. It ends where
@@ -59,8 +59,8 @@ def reduce_columns(
     return jnp.asarray(factor[:, :-1], jnp.float32), jnp.asarray(factor[:, -1], jnp.float32), offset
 
 
-def reduced_picture(reduced: ReducedGather, parameters: FalloffParameters) -> Float[Array, " rows"]:
-    """The weighted picture, rotated into the small problem's rows."""
+def reduced_image(reduced: ReducedGather, parameters: FalloffParameters) -> Float[Array, " rows"]:
+    """The weighted image, rotated into the small problem's rows."""
     weights = node_weights(parameters)
     return parameters.intensity * jnp.matmul(reduced.factor, weights, precision=jax.lax.Precision.HIGHEST)
 

@@ -2,12 +2,12 @@
 
 For VPLs and receivers that stand still, irradiance is a smooth function of the falloff parameters, whatever
 form a VPL has. So it is gathered once at the nodes of a grid over their ranges, and is the cubic spline
-through them after that: a gradient step is a matrix product of the pictures at the nodes with the nodes'
+through them after that: a gradient step is a matrix product of the images at the nodes with the nodes'
 weights. Nodes stand closest where fits end, α about 1 and κ about 0. k is a factor. Twin in value:
 `tuner.surrogate.vpl_gather.gather`.
 
 A polynomial through Chebyshev points serves softened points as well, but not discs: where the edge of one
-passes over receivers it swings, and the picture of a room erred by a tenth.
+passes over receivers it swings, and the image of a room erred by a tenth.
 """
 
 from dataclasses import dataclass
@@ -60,13 +60,13 @@ def tabulate_gather(
     def chunked(values: np.ndarray | Array) -> Array:
         return jnp.pad(jnp.asarray(values), padding).reshape(-1, chunk_size, values.shape[1])
 
-    pictures = _gather_chunks(
+    images = _gather_chunks(
         chunked(receivers.position),
         chunked(receivers.normal),
         None if visibility is None else chunked(visibility),
         vpls,
     )
-    return TabulatedGather(pictures.reshape(-1, *pictures.shape[2:])[:count])
+    return TabulatedGather(images.reshape(-1, *images.shape[2:])[:count])
 
 
 def gather_tabulated(table: TabulatedGather, parameters: FalloffParameters) -> Float[Array, "receivers 3"]:
@@ -78,11 +78,11 @@ def gather_tabulated(table: TabulatedGather, parameters: FalloffParameters) -> F
 def node_weights(parameters: FalloffParameters) -> Float[Array, " nodes"]:
     """What each node counts for the spline's value at α and κ, in the order of `TabulatedGather`."""
     of_alpha = _spline_weights(_footprint_place(parameters.falloff_footprint), FOOTPRINT_NODES)
-    of_kappa = _spline_weights(_transmittance_place(parameters.falloff_transmittance), TRANSMITTANCE_NODES)
+    of_kappa = _spline_weights(_transmittance_place(parameters.extinction_coefficient), TRANSMITTANCE_NODES)
     return (of_alpha[:, None] * of_kappa).ravel()
 
 
-_ALPHA, _KAPPA = parameter_spec("falloff_footprint"), parameter_spec("falloff_transmittance")
+_ALPHA, _KAPPA = parameter_spec("falloff_footprint"), parameter_spec("extinction_coefficient")
 
 
 def _footprint_place(footprint: Array | float) -> Array:
@@ -130,8 +130,8 @@ def _gather_chunks(
             arriving = arriving * chunk[2][:, :, None]
         arriving = arriving[:, :, None, :] * (vpls.flux / jnp.pi)[None, :, :, None]
         arriving = arriving.reshape(*arriving.shape[:2], -1)
-        pictures = jnp.matmul(forms, arriving, precision=jax.lax.Precision.HIGHEST)
-        pictures = pictures.reshape(-1, FOOTPRINT_NODES, 3, TRANSMITTANCE_NODES)
-        return pictures.transpose(0, 2, 1, 3).reshape(-1, 3, FOOTPRINT_NODES * TRANSMITTANCE_NODES)
+        images = jnp.matmul(forms, arriving, precision=jax.lax.Precision.HIGHEST)
+        images = images.reshape(-1, FOOTPRINT_NODES, 3, TRANSMITTANCE_NODES)
+        return images.transpose(0, 2, 1, 3).reshape(-1, 3, FOOTPRINT_NODES * TRANSMITTANCE_NODES)
 
     return jax.lax.map(gather_chunk, (position, normal, visibility))

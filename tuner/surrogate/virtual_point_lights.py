@@ -64,6 +64,6 @@ def gather_inputs(
             jnp.asarray(captured.vpl_normal_world, jnp.float32),
             jnp.asarray(captured.vpl_footprint / length, jnp.float32),
             jnp.asarray(captured.vpl_flux.astype(np.float64) / length**2, jnp.float32),
-            captured.vpls_are_cells,
+            captured.vpls_are_discs,
         ),
     )

@@ -34,7 +34,7 @@ class FalloffParameters:
 
     intensity: Float[Array, ""]
     falloff_footprint: Float[Array, ""]
-    falloff_transmittance: Float[Array, ""]
+    extinction_coefficient: Float[Array, ""]
 
     @classmethod
     def of(cls, parameters: ArtistParameters) -> "FalloffParameters":
@@ -42,7 +42,7 @@ class FalloffParameters:
         return cls(
             jnp.float32(parameters.intensity),
             jnp.float32(parameters.falloff_footprint),
-            jnp.float32(parameters.falloff_transmittance),
+            jnp.float32(parameters.extinction_coefficient),
         )
 
 
@@ -63,7 +63,7 @@ def vpl_irradiance(
         form = disc_form(squared, facing, height, between, jnp.maximum(footprint, LEAST_RADIUS))
     else:
         form = jnp.maximum(facing, 0.0) * jnp.maximum(height, 0.0) / squared / (squared + footprint**2)
-    transmittance = jnp.exp(-parameters.falloff_transmittance * jnp.sqrt(squared))
+    transmittance = jnp.exp(-parameters.extinction_coefficient * jnp.sqrt(squared))
     return vpl.flux * (parameters.intensity / jnp.pi * form * transmittance)
 
 
@@ -140,30 +140,30 @@ def gather(
             runtime does without visibility maps.
     """
     scene, structure = jax.tree.flatten((receivers, vpls, visibility))
-    picture = _picture(structure, parameters.falloff_footprint, parameters.falloff_transmittance, *scene)
-    return picture * (parameters.intensity / jnp.pi)
+    image = _image(structure, parameters.falloff_footprint, parameters.extinction_coefficient, *scene)
+    return image * (parameters.intensity / jnp.pi)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _picture(structure: PyTreeDef, footprint: Array, transmittance: Array, *scene: Array) -> Array:
+def _image(structure: PyTreeDef, footprint: Array, transmittance: Array, *scene: Array) -> Array:
     """The gather for k = π; `scene` and its structure: receivers, VPLs and visibility."""
     return _weighted_flux(partial(_weight, footprint, transmittance), *structure.unflatten(scene))
 
 
-@partial(_picture.defjvp, symbolic_zeros=True)
-def _picture_jvp(
+@partial(_image.defjvp, symbolic_zeros=True)
+def _image_jvp(
     structure: PyTreeDef, primals: tuple[Array, ...], tangents: tuple[Array | SymbolicZero, ...]
 ) -> tuple[Array, Array]:
-    """What α and κ do to the picture is one more gather each. Reverse mode through every pair takes longer
+    """What α and κ do to the image is one more gather each. Reverse mode through every pair takes longer
     than all three, most of all for discs."""
     moving = [index for index, tangent in enumerate(tangents) if not isinstance(tangent, SymbolicZero)]
     if any(index > 1 for index in moving):
         # The scene moves as well.
-        def picture(*moved: Array) -> Array:
+        def image(*moved: Array) -> Array:
             values = dict(enumerate(primals)) | dict(zip(moving, moved, strict=True))
-            return _picture.fun(structure, *values.values())
+            return _image.fun(structure, *values.values())
 
-        return jax.jvp(picture, [primals[index] for index in moving], [tangents[index] for index in moving])
+        return jax.jvp(image, [primals[index] for index in moving], [tangents[index] for index in moving])
     footprint, transmittance, *scene = primals
 
     def by_footprint(*pair: Any) -> Pairs:
@@ -172,12 +172,12 @@ def _picture_jvp(
     def by_transmittance(*pair: Any) -> Pairs:
         return _derivative(lambda value: _weight(footprint, value, *pair), transmittance)
 
-    picture = _picture(structure, *primals)
-    tangent = jnp.zeros_like(picture)
+    image = _image(structure, *primals)
+    tangent = jnp.zeros_like(image)
     for index in moving:
         derivative = _weighted_flux((by_footprint, by_transmittance)[index], *structure.unflatten(scene))
         tangent = tangent + derivative * tangents[index]
-    return picture, tangent
+    return image, tangent
 
 
 def _derivative(function: Callable[[Array], Pairs], value: Array) -> Pairs:

@@ -40,7 +40,7 @@ def evaluate(
     """Compare default, tuned and ceiling with the reference, on fitted and on held-out views and lights."""
     from rich.markup import escape
 
-    from vpltune.cli.metrics_table import error_budget_table, metrics_table
+    from vpltune.cli.metrics_table import error_breakdown_table, metrics_table
     from vpltune.cli.progress_display import shown_progress
     from vpltune.cli.view_flags import camera_from_flags, light_from_flags
     from vpltune.renderer.config.tuned_config import read_config
@@ -60,7 +60,7 @@ def evaluate(
     warn(tuple(document["notes"]))
     shown = (
         metrics_table(document["metrics"]),
-        *error_budget_table(document),
+        *error_breakdown_table(document),
         f"views: {escape(document['views'])}",
     )
     return Report(document, shown)

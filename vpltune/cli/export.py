@@ -8,7 +8,7 @@ import typer
 from vpltune.cli.options import JsonOption, VisibilityOption
 from vpltune.cli.report import Report, warn
 from vpltune.cli.view_options import (
-    PictureSizeOption,
+    ImageSizeOption,
     ViewFlags,
     ViewNameOption,
     ViewsFileOption,
@@ -51,7 +51,7 @@ def export(
         Path | None,
         typer.Option(metavar="SCENE", help="gltf, bundle, web: the scene.", show_default=False),
     ] = None,
-    size: PictureSizeOption = None,
+    size: ImageSizeOption = None,
     visibility: VisibilityOption = None,
     views: ViewsFileOption = None,
     view: ViewNameOption = None,

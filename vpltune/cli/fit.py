@@ -29,7 +29,7 @@ def fit(
     scene: SceneArgument,
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", metavar="DIR", help="Folder for tuned.json, pictures and metrics."),
+        typer.Option("-o", "--output", metavar="DIR", help="Folder for tuned.json, images and metrics."),
     ],
     config: StartOption = "default",
     views: ViewCountOption = VIEW_COUNT,
@@ -70,7 +70,7 @@ def fit(
     flags: ViewFlags,
     json: JsonOption = False,
 ) -> Report:
-    """Fit a scene: write DIR/tuned.json, views.json, metrics.json, and pictures before and after."""
+    """Fit a scene: write DIR/tuned.json, views.json, metrics.json, and images before and after."""
     from vpltune.cli.budget_flags import budget_from_flags, with_vpl_count
     from vpltune.cli.progress_display import shown_progress
     from vpltune.cli.view_flags import camera_from_flags, light_from_flags
@@ -103,18 +103,18 @@ def _report(document: dict, output: Path) -> Report:
     from rich.markup import escape
 
     from vpltune.cli.budget_flags import budget_lines, render_flags
-    from vpltune.cli.metrics_table import error_budget_table, metrics_table, parameters_table
+    from vpltune.cli.metrics_table import error_breakdown_table, metrics_table, parameters_table
 
-    config, picture = output / "tuned.json", output / "tuned.png"
-    command = ["vpltune", "render", document["scene"], "--config", str(config), "-o", str(picture)]
+    config, image = output / "tuned.json", output / "tuned.png"
+    command = ["vpltune", "render", document["scene"], "--config", str(config), "-o", str(image)]
     command += render_flags(document)
     shown = (
         parameters_table(document["parameters"], document["uncertainty"]),
         metrics_table(document["metrics"]),
-        *error_budget_table(document),
+        *error_breakdown_table(document),
         escape(f"{document['status']}: {document['sentence']} ({document['seconds']['total']:.1f} s)"),
         *budget_lines(document),
-        f"picture: {escape(str(output / 'comparison.png'))}",
+        f"image: {escape(str(output / 'comparison.png'))}",
         f"next:    {escape(shlex.join(command))}",
         f"report:  {escape(shlex.join(('vpltune', 'report', str(output))))}",
     )

@@ -1,4 +1,4 @@
-"""Layers of a picture as a screen shows them."""
+"""Layers of an image as a screen shows them."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ def for_display(
 ) -> np.ndarray:
     """A layer as display-referred colours, uint8 or floats in [0, 1], in the way it is usually looked at.
 
-    `exposure` None measures it from the picture.
+    `exposure` None measures it from the image.
     """
     if layer in ("direct", "indirect", "irradiance"):
         return runtime.display(pixels, exposure)

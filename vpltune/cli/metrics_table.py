@@ -77,13 +77,13 @@ def _sureness(interval: Mapping[str, Any] | None) -> tuple[str, str]:
     return ends, ", ".join(symbols[name] for name in interval["trades_with"])
 
 
-def error_budget_table(document: Mapping[str, Any]) -> tuple[Any, ...]:
+def error_breakdown_table(document: Mapping[str, Any]) -> tuple[Any, ...]:
     """A rich table of the tuned error by cause, largest first; nothing where it was not split."""
     from rich.table import Table
 
-    if "error_budget" not in document:
+    if "error_breakdown" not in document:
         return ()
-    budget = document["error_budget"]
+    budget = document["error_breakdown"]
     total = document["metrics"]["fitted"]["tuned"]["relmse"]
     table = Table(title=f"Tuned error by cause, {budget['views']} views", title_justify="left")
     table.add_column("", no_wrap=True)

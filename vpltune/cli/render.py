@@ -1,4 +1,4 @@
-"""`vpltune render`: one picture, or one layer of it, drawn by the runtime."""
+"""`vpltune render`: one image, or one layer of it, drawn by the runtime."""
 
 import math
 from pathlib import Path
@@ -16,7 +16,7 @@ from vpltune.cli.options import (
 )
 from vpltune.cli.report import Report, warn
 from vpltune.cli.view_options import (
-    PictureSizeOption,
+    ImageSizeOption,
     ViewFlags,
     ViewNameOption,
     ViewsFileOption,
@@ -49,8 +49,8 @@ def render(
     config: Annotated[
         str, typer.Option(metavar="FILE", help="A tuned config, `default` or `auto`.")
     ] = "default",
-    layer: Annotated[Layer, typer.Option(help="Which picture to draw.")] = "final",
-    size: PictureSizeOption = None,
+    layer: Annotated[Layer, typer.Option(help="Which image to draw.")] = "final",
+    size: ImageSizeOption = None,
     visibility: VisibilityOption = None,
     interleave: Annotated[
         int, typer.Option(metavar="1|2|4|8", help="Blocks of NxN pixels share the VPLs out: faster above 1.")
@@ -171,7 +171,7 @@ def _write_layer(
 
     lights = None if bouncing is None else DynamicLights(bouncing.records)
     if output.suffix.lower() == ".exr":
-        # The final picture without its tone curve is the radiance that reaches the eye.
+        # The final image without its tone curve is the radiance that reaches the eye.
         pixels = (
             runtime.render_radiance(view, lights)
             if layer == "final"

@@ -45,5 +45,5 @@ def write_clip(
         progress("frames", 1.0)
 
 
-def _bytes(picture: np.ndarray) -> np.ndarray:
-    return np.round(np.clip(picture, 0.0, 1.0) * 255.0).astype(np.uint8)
+def _bytes(image: np.ndarray) -> np.ndarray:
+    return np.round(np.clip(image, 0.0, 1.0) * 255.0).astype(np.uint8)

@@ -13,7 +13,7 @@ from vpltune.cli.report import Report
 
 VIEW_PANEL = "Camera and light, in world units (else: the scene's own, or chosen)"
 
-PictureSizeOption = Annotated[str | None, typer.Option(metavar="WxH", help="Picture size. [960x540]")]
+ImageSizeOption = Annotated[str | None, typer.Option(metavar="WxH", help="Image size. [960x540]")]
 ViewsFileOption = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Take camera, lights and size from a views.json.")
 ]

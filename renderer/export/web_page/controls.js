@@ -1,6 +1,6 @@
 // --- what is on the page, and what keys and pointers do -----------------------------------------------------------
 const element = (id) => document.getElementById(id);
-const LIVE = ["intensity", "falloff_footprint", "falloff_transmittance", "density_exponent"];
+const LIVE = ["intensity", "falloff_footprint", "extinction_coefficient", "density_exponent"];
 
 class Page {
   constructor(frame) {
@@ -209,7 +209,7 @@ function describe() {
 async function start() {
   describe();
   if (!gl) throw new Error("this browser has no WebGL 2");
-  if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("this graphics driver draws no float pictures");
+  if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("this graphics driver draws no float images");
   const frame = new Frame(makeScene(await binaryBytes()));
   window.vpltune = new Page(frame);
   await window.vpltune.finished();

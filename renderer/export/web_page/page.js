@@ -40,7 +40,7 @@ function turned(matrix, center, axis, angle) {
 }
 
 // --- WebGL --------------------------------------------------------------------------------------------------------
-const canvas = document.getElementById("picture");
+const canvas = document.getElementById("image");
 [canvas.width, canvas.height] = bundle.view.size;
 const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, preserveDrawingBuffer: true });
 
@@ -286,8 +286,8 @@ class Frame {
     const vplTarget = (count, formats = ["RGBA32F", "RGBA32F", "RGBA32F"]) =>
       makeTarget(bundle.vpl_columns, Math.ceil(count / bundle.vpl_columns), formats);
     this.vpls = vplTarget(most);
-    if (this.programs.vpl_cells) {
-      const { samples } = bundle.vpl_cells;
+    if (this.programs.clustered_discs) {
+      const { samples } = bundle.clustered_discs;
       [this.samples, this.owners, this.movedVpls] = [vplTarget(samples), vplTarget(samples, ["R32I"]), vplTarget(most)];
     }
     if (this.programs.vpl_visibility_maps) this.makeVisibility(most);
@@ -378,9 +378,9 @@ class Frame {
   drawVpls(state, parameters) {
     if (this.importance && parameters.density_importance > 0) this.measureImportance(state.camera);
     this.sumWeights(state, parameters);
-    const { vpl_count, density_relaxation } = parameters;
-    this.vplsAreCells = Boolean(this.samples) && density_relaxation > 0;
-    if (this.vplsAreCells) this.makeCells(parameters);
+    const { vpl_count, lloyd_iterations } = parameters;
+    this.vplsAreDiscs = Boolean(this.samples) && lloyd_iterations > 0;
+    if (this.vplsAreDiscs) this.makeDiscs(parameters);
     else this.placeVpls(this.vpls, parameters, vpl_count);
     if (this.visibility) this.castVisibility(vpl_count);
   }
@@ -410,16 +410,16 @@ class Frame {
   }
 
   // Samples of the RSM, the first of which are VPLs; steps of Lloyd move those to the middle of the light nearest to them.
-  makeCells(parameters) {
-    this.placeVpls(this.samples, parameters, bundle.vpl_cells.samples);
+  makeDiscs(parameters) {
+    this.placeVpls(this.samples, parameters, bundle.clustered_discs.samples);
     const [sample_position_footprint, sample_normal_area, sample_flux] = this.samples.textures;
     const samples = { sample_position_footprint, sample_normal_area, sample_flux, sample_rows: this.samples.height };
     const { vpl_count } = parameters;
     let before = this.samples;
-    for (let step = 0; step < parameters.density_relaxation; ++step) {
+    for (let step = 0; step < parameters.lloyd_iterations; ++step) {
       const values = { ...samples, ...this.vplValues(before), ...this.momentSums, vpl_count };
-      fill(this.owners, this.programs.vpl_cells_owners, values);
-      fill(this.movedVpls, this.programs.vpl_cells, { ...values, vpl_owners: this.owners.textures[0] });
+      fill(this.owners, this.programs.clustered_discs_owners, values);
+      fill(this.movedVpls, this.programs.clustered_discs, { ...values, vpl_owners: this.owners.textures[0] });
       [this.vpls, this.movedVpls] = [this.movedVpls, this.vpls];
       before = this.vpls;
     }
@@ -457,20 +457,20 @@ class Frame {
     gl.viewport(0, 0, this.gbuffer.width, this.gbuffer.height);
     const values = {
       world_to_camera: rigidInverse(camera), camera_to_world: camera, eye_world: column(camera, 3),
-      near_plane: bundle.view.near_plane, tan_half_fov: bundle.view.tan_half_fov, picture_size: bundle.view.size,
+      near_plane: bundle.view.near_plane, tan_half_fov: bundle.view.tan_half_fov, image_size: bundle.view.size,
     };
     drawScene(this.scene, this.programs.geometry, camera, bundle.view.tan_half_fov, false, values);
     fill(this.direct, this.programs.direct_light, { ...this.cameraValues(camera), ...this.rsmValues });
   }
 
-  // Add the VPLs from `first` to `end` to the picture.
+  // Add the VPLs from `first` to `end` to the image.
   gather(camera, parameters, first, end) {
     const [target, earlier] = this.indirect;
-    const falloff_transmittance = bundle.config.visibility === "none" ? 0 : parameters.falloff_transmittance;
-    const { vpl_gather, vpl_gather_cells } = this.programs;
-    fill(target, this.vplsAreCells ? vpl_gather_cells : vpl_gather, {
+    const extinction_coefficient = bundle.config.visibility === "none" ? 0 : parameters.extinction_coefficient;
+    const { vpl_gather, vpl_gather_discs } = this.programs;
+    fill(target, this.vplsAreDiscs ? vpl_gather_discs : vpl_gather, {
       ...this.cameraValues(camera), ...parameters, ...this.vplValues(this.vpls), ...this.momentSums,
-      falloff_transmittance, first, end, earlier: earlier.textures[0],
+      extinction_coefficient, first, end, earlier: earlier.textures[0],
       visibility_atlas: this.visibility?.textures[0], visibility_details: this.visibilityDetails?.textures[0],
     });
     this.indirect.reverse();

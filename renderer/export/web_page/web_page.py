@@ -41,7 +41,7 @@ _SHADERS = (
     "web/material_resolve.frag",
     "web/tone_mapping.frag",
 )
-_CELL_SHADERS = ("web/vpl_cells_owners.frag", "web/vpl_cells.frag", "web/vpl_gather_cells.frag")
+_DISC_SHADERS = ("web/clustered_discs_owners.frag", "web/clustered_discs.frag", "web/vpl_gather_discs.frag")
 _IMPORTANCE_SHADERS = (
     "web/vpl_importance_cells.frag",
     "web/vpl_importance_receivers.frag",
@@ -113,7 +113,7 @@ def _defines(document: dict[str, Any]) -> dict[str, Define]:
         "RAY_COUNT_BITS": COUNT_BITS,
         "RAY_STACK_SIZE": _TREE_DEPTH,
         "EXPOSURE_KEY": EXPOSURE_KEY,
-        "NORMAL_REACH": document["vpl_cells"]["normal_reach"],
+        "NORMAL_REACH": document["clustered_discs"]["normal_reach"],
         **vpl_disc_bounds.DEFINES,
         **vpl_importance.DEFINES,
         "IMPORTANCE_CELLS": document["vpl_importance"]["cells"],
@@ -145,8 +145,8 @@ def _whole_rows(values: np.ndarray) -> np.ndarray:
 
 def _shaders(document: dict[str, Any], defines: dict[str, Define]) -> dict[str, str]:
     names = _SHADERS
-    if document["vpl_cells"]["steps"] > 0:
-        names += _CELL_SHADERS
+    if document["clustered_discs"]["steps"] > 0:
+        names += _DISC_SHADERS
     if defines["IMPORTANCE_CELLS"]:
         names += _IMPORTANCE_SHADERS
     if defines["VISIBILITY_MAP_SIZE"]:

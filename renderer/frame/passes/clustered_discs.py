@@ -19,11 +19,11 @@ def sample_count(vpl_count: int) -> int:
     return max(SAMPLES, SAMPLES_OF_VPL * vpl_count)
 
 
-class VplCellsPass:
+class ClusteredDiscsPass:
     """Samples of the RSM, VPLs → the VPLs, each with the light of the samples that are nearest to it.
 
     Some steps of Lloyd (1982), as Dong et al. 2009 ("Interactive indirect illumination using clustered
-    visibility") make virtual area lights from RSMs. What is wrong with a picture of 32 points is most of all
+    visibility") make virtual area lights from RSMs. What is wrong with an image of 32 points is most of all
     their form; a cell shines as a disc of its spread (`shaders/common/vpl_disc.glsl`).
     """
 

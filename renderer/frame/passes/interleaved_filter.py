@@ -1,4 +1,4 @@
-"""Geometry-aware reconstruction of interleaved pictures (Keller and Heidrich 2001; Segovia et al. 2006)."""
+"""Geometry-aware reconstruction of interleaved images (Keller and Heidrich 2001; Segovia et al. 2006)."""
 
 import moderngl
 
@@ -27,11 +27,11 @@ its subsets tell."""
 
 
 class InterleavedFilterPass:
-    """G-buffer, interleaved picture → irradiance, and with `refine` the list of pixels it does not serve.
+    """G-buffer, interleaved image → irradiance, and with `refine` the list of pixels it does not serve.
 
-    With `relight`, the picture comes with the directions of its light, and neighbours count as if they had a
+    With `relight`, the image comes with the directions of its light, and neighbours count as if they had a
     pixel's normal; `shadowed` tells that visibility maps took part. With `add_base`, another irradiance
-    picture is added to the result.
+    image is added to the result.
     """
 
     def __init__(

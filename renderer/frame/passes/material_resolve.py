@@ -21,7 +21,7 @@ class MaterialResolvePass:
         share: tuple[float, float],
         radiance: moderngl.Texture,
     ) -> None:
-        """`share` weighs direct and indirect light: (1, 1) is the full picture."""
+        """`share` weighs direct and indirect light: (1, 1) is the full image."""
         for unit, texture in enumerate((gbuffer.albedo, direct_irradiance, indirect_irradiance)):
             texture.use(unit)
         set_uniforms(self._program, gbuffer_albedo=0, direct_irradiance=1, indirect_irradiance=2, share=share)

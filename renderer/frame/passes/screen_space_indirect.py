@@ -9,7 +9,7 @@ from vpltune.renderer.gpu.render_targets import GBuffer, LightAccumulation, crea
 from vpltune.renderer.gpu.shader_library import load_compute, set_uniforms
 
 BLOCK = 4
-"""Pixels along the side of a block that shares the samples out; its picture is for the interleaved filter."""
+"""Pixels along the side of a block that shares the samples out; its image is for the interleaved filter."""
 SAMPLES = 16
 """Of each pixel: 256 within a block."""
 NEAREST_PIXEL = 0.7
@@ -43,7 +43,7 @@ class ScreenSpaceIndirectPass:
             },
         )
         self._footprint = context.buffer(reserve=16)
-        self._emitter_picture = create_irradiance_target(context, size)
+        self._emitter_image = create_irradiance_target(context, size)
 
     def draw(
         self,
@@ -79,12 +79,12 @@ class ScreenSpaceIndirectPass:
             vpl_count=vpl_count,
             light_count=light_count,
         )
-        self._emitter_picture.bind_to_image(0, read=False, write=True)
+        self._emitter_image.bind_to_image(0, read=False, write=True)
         self._emitters.run(*groups)
         context.memory_barrier(context.TEXTURE_FETCH_BARRIER_BIT | context.SHADER_STORAGE_BARRIER_BIT)
 
         camera.bind_gbuffer(self._program, gbuffer, 0)
-        self._emitter_picture.use(2)
+        self._emitter_image.use(2)
         set_uniforms(self._program, emitters=2)
         interleaved_irradiance.bind_to_image(0, read=False, write=True)
         self._program.run(*groups)

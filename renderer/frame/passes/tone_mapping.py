@@ -7,11 +7,11 @@ from vpltune.renderer.gpu import buffer_bindings
 from vpltune.renderer.gpu.shader_library import load_compute, set_uniforms
 
 EXPOSURE_KEY = 0.25
-"""What the mean luminance of the picture is brought to before the tone curve."""
+"""What the mean luminance of the image is brought to before the tone curve."""
 
 
 class ToneMappingPass:
-    """Radiance → 8-bit display picture."""
+    """Radiance → 8-bit display image."""
 
     def __init__(self, context: moderngl.Context):
         self._context = context
@@ -21,7 +21,7 @@ class ToneMappingPass:
         self._exposure = context.buffer(reserve=16)
 
     def draw(self, radiance: moderngl.Texture, exposure: float | None, display: moderngl.Texture) -> None:
-        """`exposure` multiplies radiance before the curve; None measures it from the picture."""
+        """`exposure` multiplies radiance before the curve; None measures it from the image."""
         context = self._context
         self._exposure.bind_to_storage_buffer(buffer_bindings.EXPOSURE)
         radiance.use(0)

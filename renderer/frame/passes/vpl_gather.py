@@ -14,7 +14,7 @@ class VplGatherPass:
     """G-buffer, VPLs → indirect irradiance.
 
     `interleave` n: each pixel of an n×n block gathers from its own n²-th part of the VPLs, n² times as
-    bright (Keller and Heidrich 2001). Such a picture is for the interleaved filter; 1 is the full gather.
+    bright (Keller and Heidrich 2001). Such an image is for the interleaved filter; 1 is the full gather.
     `visibility`: the layout of the VPLs' visibility maps, which may be none.
     """
 
@@ -37,7 +37,7 @@ class VplGatherPass:
     ) -> None:
         """Gather from the VPLs, with the parameters, that are bound.
 
-        `direction` takes where the light comes from, in an interleaved picture. `cells`: VPLs are cells of
+        `direction` takes where the light comes from, in an interleaved image. `cells`: VPLs are cells of
         light, which shine as discs, and not points.
         """
         program = self._program(cells, listed_pixels=False)
@@ -58,7 +58,7 @@ class VplGatherPass:
         irradiance: moderngl.Texture,
         cells: bool = False,
     ) -> None:
-        """Gather in full at the listed pixels of an interleaved picture, and leave the others as they are."""
+        """Gather in full at the listed pixels of an interleaved image, and leave the others as they are."""
         assert self._interleave > 1, "a full gather has nothing to refine"
         program = self._program(cells, listed_pixels=True)
         self._bind(program, camera, gbuffer, vpl_count, irradiance)
@@ -74,7 +74,7 @@ class VplGatherPass:
                 **vpl_disc_bounds.DEFINES,
                 "INTERLEAVE": 1 if listed_pixels else self._interleave,
                 "LISTED_PIXELS": listed_pixels,
-                "VPL_CELLS": cells,
+                "VPL_DISCS": cells,
                 **self._visibility.defines,
             }
             self._programs[cells, listed_pixels] = load_compute(

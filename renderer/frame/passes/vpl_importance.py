@@ -14,7 +14,7 @@ CELLS_OF_MANY = 32
 """The same where there are more than `FEW_FACES`: a point light has six."""
 FEW_FACES = 2
 RECEIVERS = 128
-"""Surface points that stand for the picture."""
+"""Surface points that stand for the image."""
 SPREAD = 16.0
 """Times a cell's area over which its light is spread: about a VPL's own, where there are a few hundred. At a
 quarter and at four times it, the error of 32 VPLs was the same within its noise."""
@@ -45,7 +45,7 @@ class VplImportancePass:
     """G-buffer, RSM → a factor of the sampling weight for every cell of the RSM.
 
     Placing VPLs by what the camera sees is Segovia et al. 2006 ("Bidirectional instant radiosity"); here the
-    chances are those of least variance, from points spread over the picture and without visibility.
+    chances are those of least variance, from points spread over the image and without visibility.
     """
 
     def __init__(self, context: moderngl.Context, rsm: ReflectiveShadowMap):

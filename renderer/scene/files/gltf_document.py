@@ -29,7 +29,7 @@ READ_EXTENSIONS = frozenset(
     }
 )
 
-# Gloss, thin layers, metadata and motion: a still, diffuse picture is the same without them.
+# Gloss, thin layers, metadata and motion: a still, diffuse image is the same without them.
 IRRELEVANT_EXTENSIONS = frozenset(
     {
         "KHR_animation_pointer",

@@ -15,7 +15,7 @@ from vpltune.renderer.scene.scene import Camera, Light, without_scale
 def read_camera(
     camera: JsonObject, to_world: Float64[np.ndarray, "4 4"], document: GltfDocument
 ) -> Camera | None:
-    """The camera of a node; None for an orthographic one. The picture's size decides the aspect ratio.
+    """The camera of a node; None for an orthographic one. The image's size decides the aspect ratio.
 
     Raises:
         SceneFileError: a value is missing or out of range, or the node's scale leaves no direction.

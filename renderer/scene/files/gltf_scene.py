@@ -23,7 +23,7 @@ def read_gltf(path: Path, warnings: Warnings) -> Scene:
     """Read a .gltf or .glb file.
 
     Raises:
-        SceneFileError: the file breaks a rule of glTF 2.0 that its picture depends on, or a limit of ours.
+        SceneFileError: the file breaks a rule of glTF 2.0 that its image depends on, or a limit of ours.
     """
     document = open_gltf(path, warnings)
     builder = _SceneBuilder(document)

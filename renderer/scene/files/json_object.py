@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float64
 
+from vpltune.renderer.files.strict_json import DuplicateKeyError, unique_keys
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
 from vpltune.renderer.scene.files.limits import MAX_JSON_VALUES
 
@@ -138,12 +139,14 @@ def parse_json(content: bytes) -> JsonObject:
     try:
         document = json.loads(
             content.decode("utf-8-sig"),  # glTF lets a reader pass over a byte order mark
-            object_pairs_hook=_unique_keys,
+            object_pairs_hook=unique_keys,
             parse_constant=_no_constant,
             parse_float=_finite_float,
         )
     except SceneFileError:
         raise
+    except DuplicateKeyError as error:
+        raise SceneFileError(f"the document: key {str(error)!r:.60} appears twice in one object") from error
     except RecursionError as error:
         raise SceneFileError("the document: JSON is nested too deep") from error
     except ValueError as error:
@@ -194,15 +197,6 @@ def _whole(value: Any) -> int | None:
         return None
     # 2**53: beyond it a float holds only every other whole number.
     return int(value) if value == value // 1 and abs(value) <= 2**53 else None
-
-
-def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    members = dict(pairs)
-    if len(members) != len(pairs):
-        seen: set[str] = set()
-        twice = next(key for key, _ in pairs if key in seen or seen.add(key))
-        raise SceneFileError(f"the document: key {twice!r:.60} stands twice in one object")
-    return members
 
 
 def _no_constant(name: str) -> float:

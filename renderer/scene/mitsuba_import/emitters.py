@@ -237,7 +237,7 @@ def _exr_pixels(content: bytes, where: str) -> Float64[np.ndarray, "height width
         try:
             channels = OpenEXR.File(str(copy)).channels()
         except Exception as error:  # of many kinds, none of them the library's own
-            raise SceneFileError(f"{where}: is no OpenEXR picture ({error})") from error
+            raise SceneFileError(f"{where}: is no OpenEXR image ({error})") from error
         if "RGB" in channels or "RGBA" in channels:
             pixels = (channels.get("RGB") or channels["RGBA"]).pixels[..., :3]
         elif all(name in channels for name in "RGB"):

@@ -163,7 +163,7 @@ class _Import:
             raise SceneFileError(f"{sensor.where}: its film must have a width and a height of at least 1")
         matrix = sensor.to_world()
         if np.linalg.det(matrix[:3, :3]) < 0.0:
-            self.warnings.add("the camera's picture is mirrored in Mitsuba, and is not here")
+            self.warnings.add("the camera's image is mirrored in Mitsuba, and is not here")
         # Mitsuba looks along +Z with +X to the left.
         rigid = without_scale(matrix @ np.diag([-1.0, 1.0, -1.0, 1.0]))
         if rigid is None:

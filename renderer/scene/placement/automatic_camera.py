@@ -28,7 +28,7 @@ FINALISTS = 32
 OPENING_HITS, OPENING_DEPTH = 0.95, 0.4
 # What is nearer than this share of the grid's diagonal stands in the way of the view.
 NEAR = 0.12
-# Of a given light's reach, more than this share of the picture adds nothing.
+# Of a given light's reach, more than this share of the image adds nothing.
 ENOUGH_LIT = 0.45
 
 
@@ -44,7 +44,7 @@ def default_camera_for_lights(scene: Scene, lights: tuple[Light, ...]) -> tuple[
     space = free_space(scene)
     candidates, where = _cameras(space)
     shares = [lit_fraction(space, seen_by(space, camera), lights) for _, camera in candidates]
-    # As good a picture at half the lit share counts for as much as half as good a picture all lit.
+    # As good an image at half the lit share counts for as much as half as good an image all lit.
     scores = [
         round(score * min(share, ENOUGH_LIT), 9) for (score, _), share in zip(candidates, shares, strict=True)
     ]
@@ -73,7 +73,7 @@ def _cameras_inside(space: FreeSpace, places: Places) -> list[tuple[float, Camer
     """The best of all level and slightly lowered views from the free places.
 
     Wanted: all rays hit, from the front; far and varied depth; nothing close before the lens; a walled-in
-    place; eye height. Each is a factor; the few best are looked at again with a whole picture's rays.
+    place; eye height. Each is a factor; the few best are looked at again with a whole image's rays.
     """
     looks, inside = _looks()
     count = inside.sum(axis=1)
@@ -106,12 +106,12 @@ def _cameras_inside(space: FreeSpace, places: Places) -> list[tuple[float, Camer
         place, look = divmod(int(flat), len(looks))
         eye = space.to_world(places.positions[place])
         camera = Camera(look_at(eye, eye + space.voxel_world * looks[look]), YFOV)
-        finalists.append((round(_picture_score(space, camera) * float(place_weight[place]), 9), camera))
+        finalists.append((round(_image_score(space, camera) * float(place_weight[place]), 9), camera))
     return finalists
 
 
 def _looks() -> tuple[Float64[np.ndarray, "looks 3"], Float64[np.ndarray, "looks directions"]]:
-    """View directions all round, and which sphere directions (as 0 or 1) lie in the 4:3 picture of each."""
+    """View directions all round, and which sphere directions (as 0 or 1) lie in the 4:3 image of each."""
     directions = sphere_directions(PLACE_DIRECTIONS)
     looks, inside = [], []
     for pitch in np.radians([-4.0, -16.0]):
@@ -130,8 +130,8 @@ def _looks() -> tuple[Float64[np.ndarray, "looks 3"], Float64[np.ndarray, "looks
     return np.array(looks), np.array(inside, np.float64)
 
 
-def _picture_score(space: FreeSpace, camera: Camera) -> float:
-    """How much surface a picture shows from its front, at what variety of depths, with nothing in the way."""
+def _image_score(space: FreeSpace, camera: Camera) -> float:
+    """How much surface an image shows from its front, at what variety of depths, with nothing in the way."""
     sight = seen_by(space, camera)
     hit = sight.hits.hit
     if not hit.any():
@@ -173,7 +173,7 @@ def _cameras_before_openings(space: FreeSpace) -> list[tuple[float, Camera]]:
     target, extent = 0.5 * (low + high), high - low
     cameras = []
     for axis, across in ((2, 0), (0, 2)):
-        # The open side just fills the picture's height or width, whichever is first.
+        # The open side just fills the image's height or width, whichever is first.
         fitting = 0.5 * min(extent[1], extent[across] * 3.0 / 4.0) / math.tan(0.5 * OBJECT_YFOV)
         for side in (1.0, -1.0):
             back = np.zeros(3)
@@ -209,9 +209,9 @@ def _cameras_outside(space: FreeSpace) -> list[tuple[float, Camera]]:
             rotation = look_at(back, np.zeros(3))[:3, :3]
             local = (occupied - target) @ rotation
             tan_y = math.tan(0.5 * OBJECT_YFOV)
-            # Far enough for every voxel to be in the picture: z + |y|/tan and z + |x|/(tan · 4/3).
+            # Far enough for every voxel to be in the image: z + |y|/tan and z + |x|/(tan · 4/3).
             reach = np.maximum(np.abs(local[:, 1]) / tan_y, np.abs(local[:, 0]) / (tan_y * 4.0 / 3.0))
             distance = 1.02 * float((reach + local[:, 2]).max())
             eye = space.to_world(target + distance * back)
             cameras.append(Camera(look_at(eye, space.to_world(target)), OBJECT_YFOV))
-    return [(round(_picture_score(space, camera), 9), camera) for camera in cameras]
+    return [(round(_image_score(space, camera), 9), camera) for camera in cameras]

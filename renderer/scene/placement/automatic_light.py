@@ -32,7 +32,7 @@ from vpltune.renderer.scene.scene import Camera, Light, Scene
 ROOM_CONE = (math.radians(35.0), math.radians(55.0))
 OBJECT_CONE = (math.radians(18.0), math.radians(27.0))
 CONE_DIRECTIONS = 512
-# A light is best where this much of the picture is lit directly: the rest shows what bounces.
+# A light is best where this much of the image is lit directly: the rest shows what bounces.
 BEST_LIT = 0.45
 # What is nearer to a light than this share of the root mean square distance of what it meets burns out.
 BURNT = 0.45
@@ -142,9 +142,9 @@ def _best_spot(
     axes: Float64[np.ndarray, "n axes 3"],
     outer_cone: float,
 ) -> tuple[int, int, float]:
-    """Index of position and axis of the best spot, and the share of the picture that it lights.
+    """Index of position and axis of the best spot, and the share of the image that it lights.
 
-    Wanted: the cone meets surfaces; none of them is close by, which would burn out; and part of the picture
+    Wanted: the cone meets surfaces; none of them is close by, which would burn out; and part of the image
     is lit, its middle rather than its rim, and part not.
     """
     directions = sphere_directions(CONE_DIRECTIONS)

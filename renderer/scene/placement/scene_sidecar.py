@@ -40,7 +40,7 @@ LIGHT_KEYS = {
     "point": ("type", "position", "intensity"),
     "directional": ("type", "direction", "look_at", "position", "intensity"),
 }
-# A file's lights that reach less of the picture than this light nothing that can be seen.
+# A file's lights that reach less of the image than this light nothing that can be seen.
 LEAST_LIT = 0.005
 
 

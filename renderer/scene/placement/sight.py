@@ -9,10 +9,10 @@ from jaxtyping import Bool, Float64, Int64
 from vpltune.renderer.scene.placement.free_space import FreeSpace, RayHits, march_rays
 from vpltune.renderer.scene.scene import Camera, Light
 
-# Rays of one picture, columns by rows.
-PICTURE = (40, 30)
-# The middle third of the picture, either way.
-MIDDLE_RAYS = np.arange(PICTURE[0] * PICTURE[1]).reshape(PICTURE[1], PICTURE[0])[10:20, 13:27].ravel()
+# Rays of one image, columns by rows.
+IMAGE = (40, 30)
+# The middle third of the image, either way.
+MIDDLE_RAYS = np.arange(IMAGE[0] * IMAGE[1]).reshape(IMAGE[1], IMAGE[0])[10:20, 13:27].ravel()
 # Rays of one light.
 LIGHT_RAYS = 1024
 # Hits this many voxels apart are the same place: a marched distance is good to half a voxel at either end.
@@ -40,10 +40,8 @@ class Sight:
         return float(np.median(self.hits.distance[self.hits.hit])) if self.hits.hit.any() else 0.0
 
 
-def picture_directions(
-    camera: Camera, columns_rows: tuple[int, int] = PICTURE
-) -> Float64[np.ndarray, "rays 3"]:
-    """Unit directions through the pixel centres of a coarse picture of that many columns and rows."""
+def image_directions(camera: Camera, columns_rows: tuple[int, int] = IMAGE) -> Float64[np.ndarray, "rays 3"]:
+    """Unit directions through the pixel centres of a coarse image of that many columns and rows."""
     columns, rows = columns_rows
     tan_half = math.tan(0.5 * camera.yfov)
     x = (2.0 * (np.arange(columns) + 0.5) / columns - 1.0) * tan_half * columns / rows
@@ -54,8 +52,8 @@ def picture_directions(
 
 
 def seen_by(space: FreeSpace, camera: Camera) -> Sight:
-    """What a 4:3 picture of this camera shows."""
-    directions = picture_directions(camera)
+    """What a 4:3 image of this camera shows."""
+    directions = image_directions(camera)
     origin = space.to_voxels(camera.position_world)
     hits = march_from(space, origin, directions)
     return Sight(hits, origin + np.where(hits.hit, hits.distance, 0.0)[:, None] * directions)
@@ -135,7 +133,7 @@ def lit(space: FreeSpace, light: Light, points: Float64[np.ndarray, "n 3"]) -> B
 
 
 def lit_fraction(space: FreeSpace, sight: Sight, lights: tuple[Light, ...]) -> float:
-    """Share of a picture's surfaces that direct light of any of the lights reaches."""
+    """Share of an image's surfaces that direct light of any of the lights reaches."""
     points = sight.points[sight.hits.hit]
     if not len(points):
         return 0.0

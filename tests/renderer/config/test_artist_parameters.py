@@ -59,7 +59,7 @@ def test_defaults_are_those_of_the_table():
 
 def test_the_tuner_fits_intensity_both_falloffs_and_what_maps_have():
     fitted = {spec.name for spec in ARTIST_PARAMETERS if spec.fitted}
-    falloff = {"intensity", "falloff_footprint", "falloff_transmittance"}
+    falloff = {"intensity", "falloff_footprint", "extinction_coefficient"}
     assert fitted == falloff | {"visibility_bias", "visibility_softness"}
 
 

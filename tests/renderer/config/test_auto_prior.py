@@ -89,8 +89,8 @@ def test_a_prior_goes_with_maps():
 
 def test_a_prior_goes_with_points():
     broken = document()
-    broken["parameters"]["density_relaxation"] = 4
-    with pytest.raises(InputError, match="key 'auto' goes with parameters.density_relaxation 0, .* got 4"):
+    broken["parameters"]["lloyd_iterations"] = 4
+    with pytest.raises(InputError, match="key 'auto' goes with parameters.lloyd_iterations 0, .* got 4"):
         parse_config(json.dumps(broken), "auto.json")
 
 
@@ -121,4 +121,4 @@ def test_a_prior_stays_where_it_was_trained():
 def test_the_value_at_a_place_is_the_tables_scale():
     """α runs logarithmically from 0.05 to 20: halfway lies their geometric mean."""
     assert value_at(parameter_spec("falloff_footprint"), 0.5) == pytest.approx(1.0)
-    assert value_at(parameter_spec("falloff_transmittance"), 0.5) == pytest.approx(4.0)
+    assert value_at(parameter_spec("extinction_coefficient"), 0.5) == pytest.approx(4.0)

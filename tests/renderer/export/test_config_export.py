@@ -19,7 +19,7 @@ CONFIG = TunedConfig(
     ArtistParameters(
         intensity=1.0 / 3.0,
         falloff_footprint=20.0,
-        falloff_transmittance=1e-7,
+        extinction_coefficient=1e-7,
         vpl_count=65536,
         density_exponent=0.0,
     ),

@@ -1,4 +1,4 @@
-"""The example that reads an exported bundle draws the runtime's picture, without any of our packages."""
+"""The example that reads an exported bundle draws the runtime's image, without any of our packages."""
 
 import dataclasses
 import json
@@ -16,7 +16,7 @@ from vpltune.__main__ import run
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.export.scene_bundle import scene_bundle, write_bundle
 from vpltune.renderer.scene.scene import look_at
-from vpltune.tuner.fitting.fit_density import CELL_FOOTPRINT
+from vpltune.tuner.fitting.fit_density import DISC_FOOTPRINT
 
 # Importing one of ours would fail.
 WITHOUT_US = (
@@ -28,7 +28,7 @@ WITHOUT_US = (
 )
 
 
-def read_picture(folder, output):
+def read_image(folder, output):
     command = [sys.executable, "-c", WITHOUT_US, str(READER), str(folder), str(output)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=folder, check=False)
     assert done.returncode == 0, done.stderr
@@ -47,14 +47,14 @@ def read_picture(folder, output):
         ("point", "maps"),
     ],
 )
-def test_the_picture_is_the_runtimes(tmp_path, light, visibility):
+def test_the_image_is_the_runtimes(tmp_path, light, visibility):
     scene, view, config = textured_room(), room_view(light, (96, 72)), CONFIG.seen_by(visibility)
     write_bundle(tmp_path, scene_bundle(scene, view, config, rsm_resolution=256))
-    picture, said = read_picture(tmp_path, tmp_path / "picture.png")
+    image, said = read_image(tmp_path, tmp_path / "image.png")
     ours = Runtime(scene, config, rsm_resolution=256).render(view)
     assert said == ""
     assert np.ptp(ours) > 100
-    difference = np.abs(picture.astype(int) - ours)
+    difference = np.abs(image.astype(int) - ours)
     # Where the edge of a triangle passes through a pixel's centre, rounding decides which side is drawn.
     assert (difference.max(axis=-1) > 1).mean() < 1e-3, difference.max()
     assert difference.mean() < 0.1
@@ -66,16 +66,16 @@ def test_several_lights_share_the_vpls(tmp_path):
         view, lights=(ROOM_LIGHTS["directional"], ROOM_LIGHTS["point"], ROOM_LIGHTS["spot"])
     )
     write_bundle(tmp_path, scene_bundle(scene, view, CONFIG, rsm_resolution=128))
-    picture, _ = read_picture(tmp_path, tmp_path / "picture.png")
+    image, _ = read_image(tmp_path, tmp_path / "image.png")
     ours = Runtime(scene, CONFIG, rsm_resolution=128).render(view)
-    assert (np.abs(picture.astype(int) - ours).max(axis=-1) > 1).mean() < 1e-3
+    assert (np.abs(image.astype(int) - ours).max(axis=-1) > 1).mean() < 1e-3
 
 
 @pytest.mark.parametrize("turned", ["light", "camera"])
 def test_nothing_lit_or_nothing_seen_is_black(tmp_path, turned):
     """Few VPLs, placed by all that there is to place them by."""
     parameters = dataclasses.replace(
-        CONFIG.parameters, vpl_count=8, density_importance=0.7, density_relaxation=2
+        CONFIG.parameters, vpl_count=8, density_importance=0.7, lloyd_iterations=2
     )
     scene, view, config = (
         colored_room(),
@@ -92,10 +92,10 @@ def test_nothing_lit_or_nothing_seen_is_black(tmp_path, turned):
     else:
         view = dataclasses.replace(view, camera=dataclasses.replace(view.camera, to_world=outside))
     write_bundle(tmp_path, scene_bundle(scene, view, config, rsm_resolution=64))
-    picture, said = read_picture(tmp_path, tmp_path / "picture.png")
+    image, said = read_image(tmp_path, tmp_path / "image.png")
     ours = Runtime(scene, config, rsm_resolution=64).render(view)
     assert said == ""
-    assert not picture.any()
+    assert not image.any()
     assert not ours.any()
 
 
@@ -114,27 +114,27 @@ def test_a_shipped_scene_by_the_command_line(tmp_path, capfd, name, visibility):
     assert run(["export", "default", "--to", "bundle", "--scene", scene, "-o", str(bundle), *common]) == 0
     assert capfd.readouterr().err == ""
     assert run(["render", scene, "-o", str(tmp_path / "ours.png"), *common]) == 0
-    picture, _ = read_picture(bundle, tmp_path / "theirs.png")
+    image, _ = read_image(bundle, tmp_path / "theirs.png")
     ours = np.asarray(Image.open(tmp_path / "ours.png")).astype(int)
-    assert np.abs(picture - ours).max() <= 1
+    assert np.abs(image - ours).max() <= 1
 
 
 @pytest.mark.parametrize("light", ["point", "directional"])
-@pytest.mark.parametrize("placement", [{"density_relaxation": 8}, {"density_importance": 0.7}], ids=str)
+@pytest.mark.parametrize("placement", [{"lloyd_iterations": 8}, {"density_importance": 0.7}], ids=str)
 def test_few_vpls_are_placed_as_the_runtime_places_them(tmp_path, light, placement):
     """As cells, which shine as discs, or by what the camera sees."""
-    plain = dataclasses.replace(CONFIG.parameters, vpl_count=32, falloff_footprint=CELL_FOOTPRINT)
+    plain = dataclasses.replace(CONFIG.parameters, vpl_count=32, falloff_footprint=DISC_FOOTPRINT)
     parameters = dataclasses.replace(plain, **placement)
     scene, view = textured_room(), room_view(light, (96, 72))
     bundle = scene_bundle(scene, view, TunedConfig(parameters, visibility="maps"), rsm_resolution=256)
     write_bundle(tmp_path, bundle)
-    picture, _ = read_picture(tmp_path, tmp_path / "picture.png")
+    image, _ = read_image(tmp_path, tmp_path / "image.png")
     ours, others = (
         Runtime(scene, TunedConfig(form, visibility="maps"), rsm_resolution=256).render(view)
         for form in (parameters, plain)
     )
-    assert (np.abs(picture - ours.astype(int)).max(axis=-1) > 1).mean() < 1e-3
-    assert (np.abs(picture - others.astype(int)).max(axis=-1) > 3).mean() > 0.1
+    assert (np.abs(image - ours.astype(int)).max(axis=-1) > 1).mean() < 1e-3
+    assert (np.abs(image - others.astype(int)).max(axis=-1) > 3).mean() > 0.1
 
 
 @pytest.mark.parametrize("file", sorted(READER.parent.glob("standalone_*")), ids=lambda file: file.name)

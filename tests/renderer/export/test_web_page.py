@@ -1,4 +1,4 @@
-"""The exported page in a real browser: the runtime's picture, moved by keys and pointer, nothing fetched."""
+"""The exported page in a real browser: the runtime's image, moved by keys and pointer, nothing fetched."""
 
 import base64
 import dataclasses
@@ -25,13 +25,13 @@ from vpltune.renderer.frame.passes.clustered_discs import NORMAL_REACH
 from vpltune.renderer.gpu.camera_uniforms import camera_uniforms
 from vpltune.renderer.scene.light_faces import light_records
 from vpltune.renderer.scene.scene import Camera
-from vpltune.tuner.fitting.fit_density import CELL_FOOTPRINT
+from vpltune.tuner.fitting.fit_density import DISC_FOOTPRINT
 
 SOFTWARE_GL = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 RESOLUTION = 256
 CELLS = TunedConfig(
     dataclasses.replace(
-        CONFIG.parameters, vpl_count=32, density_relaxation=8, falloff_footprint=CELL_FOOTPRINT
+        CONFIG.parameters, vpl_count=32, lloyd_iterations=8, falloff_footprint=DISC_FOOTPRINT
     ),
     visibility="maps",
 )
@@ -55,7 +55,7 @@ def browser():
 
 @pytest.fixture
 def opened(browser, tmp_path):
-    """Opens a page's text as a file, and hands back the browser's page once the picture is whole."""
+    """Opens a page's text as a file, and hands back the browser's page once the image is whole."""
     pages, asked, complaints = [], [], []
 
     def open_page(text, **options):
@@ -87,9 +87,9 @@ def web_view(light, size=(96, 72)):
     return dataclasses.replace(view, camera=Camera(to_world, view.camera.yfov))
 
 
-def picture_of(page):
+def image_of(page):
     page.evaluate("vpltune.finished()")
-    encoded = page.evaluate("document.getElementById('picture').toDataURL('image/png')").split(",")[1]
+    encoded = page.evaluate("document.getElementById('image').toDataURL('image/png')").split(",")[1]
     return np.asarray(Image.open(io.BytesIO(base64.b64decode(encoded))).convert("RGB")).astype(int)
 
 
@@ -97,7 +97,7 @@ def page_text(scene, view, config=CONFIG):
     return web_page(scene_bundle(scene, view, config, rsm_resolution=RESOLUTION), left_out(config))
 
 
-def assert_same(picture, runtime, view, exposure=None, *, textured=False, but=1e-3):
+def assert_same(image, runtime, view, exposure=None, *, textured=False, but=1e-3):
     """To 3/255, where walls have textures to 8/255, in all but one pixel in a thousand.
 
     OpenGL leaves to the driver how textures are filtered at a slant: without anisotropy these walls agree to
@@ -107,14 +107,14 @@ def assert_same(picture, runtime, view, exposure=None, *, textured=False, but=1e
     ours = runtime.render(view, exposure=exposure).astype(int)
     assert np.ptp(ours) > 100
     side_walls = np.abs(runtime.render(view, "normal")[..., 0]) > 0.9
-    difference = np.abs(picture - ours).max(axis=-1)
+    difference = np.abs(image - ours).max(axis=-1)
     differ = difference > np.where(side_walls & textured, 8, 3)
     assert differ.mean() < but, f"{differ.sum()} pixels, by up to {difference.max()}"
 
 
-def assert_same_picture(page, scene, view, config=CONFIG, **tolerance):
+def assert_same_image(page, scene, view, config=CONFIG, **tolerance):
     runtime = Runtime(scene, config, rsm_resolution=RESOLUTION)
-    assert_same(picture_of(page), runtime, view, textured=bool(scene.textures), **tolerance)
+    assert_same(image_of(page), runtime, view, textured=bool(scene.textures), **tolerance)
 
 
 @pytest.mark.parametrize(
@@ -127,17 +127,17 @@ def assert_same_picture(page, scene, view, config=CONFIG, **tolerance):
         ("directional", "maps"),
     ],
 )
-def test_the_picture_is_the_runtimes(opened, light, visibility):
+def test_the_image_is_the_runtimes(opened, light, visibility):
     scene, view, config = textured_room(), web_view(light), CONFIG.seen_by(visibility)
-    assert_same_picture(opened(page_text(scene, view, config)), scene, view, config)
+    assert_same_image(opened(page_text(scene, view, config)), scene, view, config)
 
 
 def test_visibility_maps_are_cast_in_the_page(opened):
     scene, view, config = textured_room(), web_view("spot"), dataclasses.replace(CONFIG, visibility="maps")
     page = opened(page_text(scene, view, config))
-    assert_same_picture(page, scene, view, config)
+    assert_same_image(page, scene, view, config)
     plain = Runtime(scene, CONFIG.seen_by("transmittance"), rsm_resolution=RESOLUTION).render(view)
-    assert (np.abs(picture_of(page) - plain).max(axis=-1) > 3).mean() > 0.1
+    assert (np.abs(image_of(page) - plain).max(axis=-1) > 3).mean() > 0.1
 
 
 @pytest.mark.parametrize("light", ["spot", "directional"])
@@ -145,15 +145,15 @@ def test_cells_shine_as_discs_in_the_page(opened, light):
     """In all but 5 pixels in a thousand: each step towards a cell's middle carries on how samples differ.
 
     Rasterisers put edges of the RSM into other texels, which samples then follow. Between the runtime's own
-    pictures from RSMs of 256² and 257², 16 to 22 pixels in a thousand differ so.
+    images from RSMs of 256² and 257², 16 to 22 pixels in a thousand differ so.
     """
     scene, view = colored_room(), web_view(light)
     page = opened(page_text(scene, view, CELLS))
-    assert_same_picture(page, scene, view, CELLS, but=5e-3)
-    cells = picture_of(page)
-    parameters = dataclasses.replace(CELLS.parameters, density_relaxation=0)
+    assert_same_image(page, scene, view, CELLS, but=5e-3)
+    cells = image_of(page)
+    parameters = dataclasses.replace(CELLS.parameters, lloyd_iterations=0)
     points = opened(page_text(scene, view, dataclasses.replace(CELLS, parameters=parameters)))
-    assert (np.abs(picture_of(points) - cells).max(axis=-1) > 3).mean() > 0.1
+    assert (np.abs(image_of(points) - cells).max(axis=-1) > 3).mean() > 0.1
 
 
 def test_cells_are_the_standalone_readers(opened):
@@ -166,7 +166,7 @@ def test_cells_are_the_standalone_readers(opened):
     length = np.sqrt(moments[0, 4] / moments[0, 3] - np.square(moments[0, :3] / moments[0, 3]).sum())
     relaxed = runpy.run_path(str(READER.with_name("standalone_vpls.py")))["relaxed"]
     expected = samples[:32]
-    for _ in range(CELLS.parameters.density_relaxation):
+    for _ in range(CELLS.parameters.lloyd_iterations):
         expected = relaxed(expected, samples[samples[:, 3] > 0.0], length, NORMAL_REACH)
     assert np.linalg.norm(expected[:, :3] - samples[:32, :3], axis=1).max() > 0.1 * length
     np.testing.assert_allclose(vpls[:32, :4], expected[:, :4], atol=1e-4 * length)
@@ -181,18 +181,18 @@ def test_vpls_are_placed_by_what_the_camera_sees(opened, light):
     parameters = dataclasses.replace(CONFIG.parameters, vpl_count=32, density_importance=0.7)
     config = dataclasses.replace(CONFIG, parameters=parameters)
     page = opened(page_text(scene, view, config))
-    assert_same_picture(page, scene, view, config)
+    assert_same_image(page, scene, view, config)
     for _ in range(4):
         page.keyboard.press("ArrowLeft")
     camera = Camera(np.array(page.evaluate("vpltune.camera")), view.camera.yfov)
     there, exposure = dataclasses.replace(view, camera=camera), page.evaluate("vpltune.exposure")
     runtime = Runtime(scene, config, rsm_resolution=RESOLUTION)
-    assert_same(picture_of(page), runtime, there, exposure)
+    assert_same(image_of(page), runtime, there, exposure)
     page.keyboard.press("t")
     plain = dataclasses.replace(CONFIG, parameters=dataclasses.replace(ArtistParameters(), vpl_count=32))
     runtime = Runtime(scene, plain, rsm_resolution=RESOLUTION)
-    assert (np.abs(picture_of(page) - runtime.render(view)).max(axis=-1) > 3).mean() > 0.1
-    assert_same(picture_of(page), runtime, there, exposure)
+    assert (np.abs(image_of(page) - runtime.render(view)).max(axis=-1) > 3).mean() > 0.1
+    assert_same(image_of(page), runtime, there, exposure)
 
 
 def test_it_goes_on_being_the_runtimes_when_things_move(opened):
@@ -202,7 +202,7 @@ def test_it_goes_on_being_the_runtimes_when_things_move(opened):
     for key in ("ArrowLeft", "ArrowLeft", "ArrowUp", "+", "d", "d", "s"):
         page.keyboard.press(key)
     page.keyboard.press("r")
-    assert_same_picture(page, scene, view)
+    assert_same_image(page, scene, view)
     for key in ("ArrowLeft", "ArrowLeft", "ArrowUp", "-", "d", "s"):
         page.keyboard.press(key)
     moved = page.evaluate("({ camera: vpltune.camera, lights: vpltune.lights })")
@@ -213,13 +213,13 @@ def test_it_goes_on_being_the_runtimes_when_things_move(opened):
     there = dataclasses.replace(view, camera=camera, lights=(light,))
     exposure = page.evaluate("vpltune.exposure")
     runtime = Runtime(scene, CONFIG, rsm_resolution=RESOLUTION)
-    assert_same(picture_of(page), runtime, there, exposure)
+    assert_same(image_of(page), runtime, there, exposure)
     page.keyboard.press("t")
     assert page.get_attribute("#default", "aria-pressed") == "true"
     parameters = dataclasses.replace(ArtistParameters(), vpl_count=CONFIG.parameters.vpl_count)
     plain = dataclasses.replace(CONFIG, parameters=parameters)
     runtime = Runtime(scene, plain, rsm_resolution=RESOLUTION)
-    assert_same(picture_of(page), runtime, there, exposure)
+    assert_same(image_of(page), runtime, there, exposure)
 
 
 def test_a_sun_turns_and_several_lights_are_chosen_among(opened):
@@ -227,10 +227,10 @@ def test_a_sun_turns_and_several_lights_are_chosen_among(opened):
         web_view("spot", (48, 36)), lights=(ROOM_LIGHTS["directional"], ROOM_LIGHTS["point"])
     )
     page = opened(page_text(textured_room(), view))
-    before, place = picture_of(page), page.inner_text("#light-place")
+    before, place = image_of(page), page.inner_text("#light-place")
     page.keyboard.press("d")
     assert page.inner_text("#light-place") != place
-    assert (picture_of(page) != before).any()
+    assert (image_of(page) != before).any()
     assert np.hypot.reduce(page.evaluate("vpltune.lights[0].direction")) == pytest.approx(1.0)
     page.click("text=2: point")
     assert page.inner_text("#light-place").startswith("at ")
@@ -238,21 +238,21 @@ def test_a_sun_turns_and_several_lights_are_chosen_among(opened):
 
 def test_exposure_pointer_and_sliders(opened):
     page = opened(page_text(textured_room(), web_view("spot", (48, 36))))
-    plain = picture_of(page)
+    plain = image_of(page)
     page.keyboard.press("]")
     assert page.inner_text("#exposure-value") == "+0.2 stops"
-    assert picture_of(page).mean() > plain.mean()
+    assert image_of(page).mean() > plain.mean()
     page.keyboard.press("r")
-    assert (picture_of(page) == plain).all()
-    box = page.locator("#picture").bounding_box()
+    assert (image_of(page) == plain).all()
+    box = page.locator("#image").bounding_box()
     page.mouse.move(box["x"] + 50, box["y"] + 50)
     page.mouse.down()
     page.mouse.move(box["x"] + 120, box["y"] + 60, steps=3)
     page.mouse.up()
-    assert (picture_of(page) != plain).any()
+    assert (image_of(page) != plain).any()
     page.click("#reset")
     page.locator("#intensity").fill("2.5")
-    assert picture_of(page).mean() > plain.mean()
+    assert image_of(page).mean() > plain.mean()
     assert page.get_attribute("#tuned", "aria-pressed") == "false"
 
 
@@ -279,7 +279,7 @@ def test_names_cannot_break_out_and_what_is_left_out_is_said(opened):
     assert page.inner_text("h1") == name
     assert "near field is drawn by the runtime alone" in page.inner_text("#note")
     # Discs withhold nothing that a near field would give back.
-    cells = dataclasses.replace(parameters, density_relaxation=8)
+    cells = dataclasses.replace(parameters, lloyd_iterations=8)
     assert left_out(TunedConfig(cells)) == ()
 
 

@@ -1,4 +1,4 @@
-"""Pictures on disk: what is written reads back, orientation and bits kept."""
+"""Images on disk: what is written reads back, orientation and bits kept."""
 
 from pathlib import Path
 
@@ -12,11 +12,11 @@ from vpltune.renderer.files.image_file import read_exr, require_extension, write
 
 
 def test_png_of_bytes_reads_back_the_same(tmp_path):
-    picture = np.random.default_rng(1).integers(0, 256, (5, 7, 3), dtype=np.uint8)
-    write_png(tmp_path / "a.png", picture)
-    with Image.open(tmp_path / "a.png") as image:
-        assert (image.mode, image.size) == ("RGB", (7, 5))
-        np.testing.assert_array_equal(np.asarray(image), picture)
+    image = np.random.default_rng(1).integers(0, 256, (5, 7, 3), dtype=np.uint8)
+    write_png(tmp_path / "a.png", image)
+    with Image.open(tmp_path / "a.png") as read:
+        assert (read.mode, read.size) == ("RGB", (7, 5))
+        np.testing.assert_array_equal(np.asarray(read), image)
 
 
 def test_png_of_floats_rounds_to_nearest_and_clamps(tmp_path):
@@ -56,20 +56,20 @@ def test_extensions_are_asked_for_in_any_case():
 
 
 def test_refusals_leave_nothing_behind(tmp_path):
-    picture = np.zeros((2, 2, 3), np.float32)
+    image = np.zeros((2, 2, 3), np.float32)
     with pytest.raises(InputError, match=r"must end in .png, got '.exr'"):
-        write_png(tmp_path / "a.exr", picture)
+        write_png(tmp_path / "a.exr", image)
     with pytest.raises(InputError, match=r"must end in .exr, got '.png'"):
-        write_exr(tmp_path / "a.png", picture)
+        write_exr(tmp_path / "a.png", image)
     with pytest.raises(InputError, match="holds NaN"):
-        write_png(tmp_path / "a.png", picture * np.nan)
+        write_png(tmp_path / "a.png", image * np.nan)
     assert not list(tmp_path.iterdir())
 
 
 def test_files_that_are_no_exr_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"absent.exr: cannot be read \(no such file\)"):
         read_exr(tmp_path / "absent.exr")
-    (tmp_path / "text.exr").write_text("not a picture")
+    (tmp_path / "text.exr").write_text("not an image")
     with pytest.raises(InputError, match="text.exr: not a readable EXR file"):
         read_exr(tmp_path / "text.exr")
     with OpenEXR.File({}, {"A": np.ones((1, 1), np.float32), "B": np.ones((1, 1), np.float32)}) as file:

@@ -45,18 +45,18 @@ def test_the_gpu_evaluates_the_prior(gl_context, light):
     assert runtime.drawn_parameters().screen_space_radius == 5.0
 
 
-def test_the_picture_is_drawn_with_them(gl_context):
+def test_the_image_is_drawn_with_them(gl_context):
     """The same as with the parameters that were read back, given by hand; to their float32."""
     runtime = runtime_of(gl_context)
-    picture = runtime.render(room_view(), "irradiance")
+    image = runtime.render(room_view(), "irradiance")
     found = runtime.drawn_parameters()
     assert found != BASE
     runtime.parameters = found
     by_hand = runtime.render(room_view(), "irradiance")
-    np.testing.assert_allclose(by_hand, picture, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(by_hand, image, rtol=1e-4, atol=1e-6)
     assert runtime.drawn_parameters() == found
     runtime.parameters = BASE
-    assert np.abs(runtime.render(room_view(), "irradiance") - picture).max() > 0.05 * picture.max()
+    assert np.abs(runtime.render(room_view(), "irradiance") - image).max() > 0.05 * image.max()
 
 
 def test_scale_changes_nothing(gl_context):
@@ -101,7 +101,7 @@ def test_darkness_has_parameters_too(gl_context):
 
 
 def test_nothing_was_drawn_yet(gl_context):
-    with pytest.raises(ValueError, match="drawn_parameters: no picture has been drawn yet"):
+    with pytest.raises(ValueError, match="drawn_parameters: no image has been drawn yet"):
         runtime_of(gl_context).drawn_parameters()
     with pytest.raises(ValueError, match="adaptation_frames: must be in"):
         RuntimeOptions(adaptation_frames=-1.0)

@@ -10,10 +10,10 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters, placemen
 from vpltune.renderer.frame.runtime import Runtime
 
 START = ArtistParameters(vpl_count=64)
-DISCS = replace(START, density_relaxation=2, density_importance=0.5, falloff_footprint=1.0)
+DISCS = replace(START, lloyd_iterations=2, density_importance=0.5, falloff_footprint=1.0)
 OTHERS = (
     replace(START, intensity=2.0, falloff_footprint=1.5),
-    replace(START, falloff_transmittance=0.4, visibility_bias=0.02, visibility_softness=0.2),
+    replace(START, extinction_coefficient=0.4, visibility_bias=0.02, visibility_softness=0.2),
     replace(START, screen_space_strength=1.0),
 )
 
@@ -57,4 +57,4 @@ def test_parameters_that_place_vpls_differently_are_refused(runtime):
 
 def test_a_placement_is_what_vpls_depend_on():
     assert placement(START) == placement(OTHERS[0]) == (64, 1.0, 0.0, 0)
-    assert placement(replace(START, density_relaxation=2)) != placement(START)
+    assert placement(replace(START, lloyd_iterations=2)) != placement(START)

@@ -45,7 +45,7 @@ def test_every_pass_is_timed(runtime):
 def test_the_passes_add_up_to_the_frame(runtime, gl_context):
     """By the wall clock the passes are nearly all of a finished frame: at least half, and no more than it.
 
-    Half, because uploads and Python between passes are not theirs; the room's picture is large enough that
+    Half, because uploads and Python between passes are not theirs; the room's image is large enough that
     they are little.
     """
     view = room_view(size=(256, 192))

@@ -106,7 +106,7 @@ def test_parameters_that_follow_the_scene_are_not_read_back(gl_context, calls):
 
 def test_cells_are_not_read_back(gl_context, calls):
     """VPLs are moved to the middle of their cells on the GPU, and all buffers are there after one frame."""
-    config = TunedConfig(ArtistParameters(vpl_count=64, density_relaxation=2), visibility="maps")
+    config = TunedConfig(ArtistParameters(vpl_count=64, lloyd_iterations=2), visibility="maps")
     runtime = Runtime(colored_room(), config, context=gl_context, rsm_resolution=64)
     runtime.draw(everything_view())
     calls.clear()
@@ -124,7 +124,7 @@ def test_the_first_frame_reads_nothing_either(gl_context, calls):
 
 
 def test_reads_are_seen(gl_context, calls):
-    """The count is not blind: a picture asked for is one read, buffers captured are more."""
+    """The count is not blind: an image asked for is one read, buffers captured are more."""
     runtime = Runtime(colored_room(), "default", context=gl_context, rsm_resolution=64)
     view = everything_view()
     runtime.render(view)

@@ -1,4 +1,4 @@
-"""The tables of points that VPLs are placed from, and how far the picture hangs on where they lie."""
+"""The tables of points that VPLs are placed from, and how far the image hangs on where they lie."""
 
 import numpy as np
 import pytest

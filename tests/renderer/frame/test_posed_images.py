@@ -103,7 +103,7 @@ def test_bounds_follow_joints(gl_context):
 
 
 def test_skinned_corpus_at_rest_is_drawn_as_it_was_baked(corpora_folder, gl_context):
-    """On the GPU's joints at rest, a skinned file gives the picture of its vertices baked at rest."""
+    """On the GPU's joints at rest, a skinned file gives the image of its vertices baked at rest."""
     folder = corpora_folder / "asset_generator" / "Output" / "Animation_Skin"
     compared = 0
     for path in sorted(folder.glob("*.gltf")):

@@ -19,11 +19,11 @@ def test_runtimes_do_not_disturb_each_other():
 
 @pytest.mark.parametrize("layer", LAYERS)
 def test_every_layer_has_its_shape_and_values(gl_context, layer):
-    picture = Runtime(colored_room(), "default", context=gl_context).render(room_view("spot"), layer)
-    assert picture.shape == ((48, 64) if layer == "depth" else (48, 64, 3))
-    assert picture.dtype == (np.uint8 if layer == "final" else np.float32)
-    assert np.isfinite(picture).all()
-    assert picture.any()
+    image = Runtime(colored_room(), "default", context=gl_context).render(room_view("spot"), layer)
+    assert image.shape == ((48, 64) if layer == "depth" else (48, 64, 3))
+    assert image.dtype == (np.uint8 if layer == "final" else np.float32)
+    assert np.isfinite(image).all()
+    assert image.any()
 
 
 def test_an_object_released_by_hand_does_no_harm(gl_context):
@@ -52,7 +52,7 @@ def test_white_maps_to_white_and_black_to_black(gl_context):
 
 
 def test_measured_exposure_does_not_depend_on_the_light_level(gl_context):
-    """A picture a thousand times as bright is shown the same, to one step of 8 bits."""
+    """An image a thousand times as bright is shown the same, to one step of 8 bits."""
     runtime = Runtime(colored_room(), "default", context=gl_context)
     radiance = runtime.render_radiance(room_view("spot"))
     dim, bright = runtime.display(radiance), runtime.display(radiance * 1000.0)

@@ -57,7 +57,7 @@ class Soak:
         self.bouncing.advance(1.0 / FPS)
         self.lights.update(self.bouncing.records)
 
-    def first_picture(self) -> np.ndarray:
+    def first_image(self) -> np.ndarray:
         moment = self.sequence.at(0.0)
         self.runtime.pose(moment.pose)
         lights = DynamicLights(self.first_records)
@@ -68,7 +68,7 @@ class Soak:
 def test_soak(gl_context, frames):
     """Growth may be 1 MiB: a hundred bytes left behind by each frame, or one texture by them all."""
     soak = Soak(gl_context)
-    first = soak.first_picture()
+    first = soak.first_image()
     settled_at = min(SETTLED, frames // 2)
     settled = 0
     for frame in range(frames):
@@ -82,4 +82,4 @@ def test_soak(gl_context, frames):
     assert gl_context.error == "GL_NO_ERROR"
     moved = soak.runtime.render_radiance(soak.sequence.at(1.0).view)
     assert np.abs(moved - first).max() > 0.01, "nothing moved"
-    np.testing.assert_array_equal(soak.first_picture(), first)
+    np.testing.assert_array_equal(soak.first_image(), first)

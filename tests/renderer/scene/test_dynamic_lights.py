@@ -1,4 +1,4 @@
-"""Dynamic lights: closed forms, three ways to one picture, and what a frame of them costs in calls."""
+"""Dynamic lights: closed forms, three ways to one image, and what a frame of them costs in calls."""
 
 import moderngl
 import numpy as np
@@ -6,7 +6,7 @@ import pytest
 from built_scenes import colored_room, quad, room_view, scene_of
 
 from vpltune.renderer.config.tuned_config import TunedConfig
-from vpltune.renderer.frame.capture import read_picture
+from vpltune.renderer.frame.capture import read_image
 from vpltune.renderer.frame.passes.light_volumes import (
     CONE_DEFINES,
     LightVolumesPass,
@@ -50,7 +50,7 @@ class Lighting:
         lights = DynamicLights(records)
         self.buffer.upload(lights)
         self.passes[way].draw(self.camera, lights)
-        stored = read_picture(self.passes[way].light_accumulation)[..., :3]
+        stored = read_image(self.passes[way].light_accumulation)[..., :3]
         return stored.astype(np.float32) * np.float32(lights.accumulation_unit)
 
 
@@ -127,13 +127,13 @@ def test_one_light_is_its_closed_form(room, name, way):
     )
 
 
-def test_three_ways_give_one_picture(room):
+def test_three_ways_give_one_image(room):
     """400 lights of both kinds, to 1e-3: the largest difference is one rounding to half floats."""
     records = random_lights(400, seed=1)
-    pictures = [room.irradiance(records, way.__name__) for way in WAYS]
-    assert (pictures[0] > 0.0).any(axis=-1).mean() > 0.4
-    for picture in pictures[1:]:
-        np.testing.assert_allclose(picture, pictures[0], rtol=1e-3, atol=1e-5 * float(pictures[0].max()))
+    images = [room.irradiance(records, way.__name__) for way in WAYS]
+    assert (images[0] > 0.0).any(axis=-1).mean() > 0.4
+    for image in images[1:]:
+        np.testing.assert_allclose(image, images[0], rtol=1e-3, atol=1e-5 * float(images[0].max()))
 
 
 def test_more_lights_than_a_batch_holds(room):
@@ -184,16 +184,16 @@ def test_nothing_beyond_the_range(room, way):
 @pytest.mark.parametrize("factor", [0.01, 0.1, 10.0, 100.0])
 @pytest.mark.parametrize("path", ["volumes", "tiles"])
 def test_scale_changes_nothing(gl_context, path, factor):
-    """Scene, camera, lights scaled together: the same picture to 1e-3 relative RMSE."""
+    """Scene, camera, lights scaled together: the same image to 1e-3 relative RMSE."""
     view, records = room_view("spot"), random_lights(200, seed=5)
-    pictures = []
+    images = []
     for scale in (1.0, factor):
         runtime = Runtime(
             scaled(colored_room(), scale), "default", RuntimeOptions(light_path=path), context=gl_context
         )
         lights = DynamicLights(scaled_records(records, scale))
-        pictures.append(runtime.render_radiance(scaled_view(view, scale), lights))
-    error = np.sqrt(np.mean((pictures[1] - pictures[0]) ** 2) / np.mean(pictures[0] ** 2))
+        images.append(runtime.render_radiance(scaled_view(view, scale), lights))
+    error = np.sqrt(np.mean((images[1] - images[0]) ** 2) / np.mean(images[0] ** 2))
     assert error < 1e-3
 
 

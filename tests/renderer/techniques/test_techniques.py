@@ -6,7 +6,7 @@ from built_scenes import ROOM_LIGHTS, colored_room, quad, scene_of
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
-from vpltune.renderer.frame.capture import read_picture
+from vpltune.renderer.frame.capture import read_image
 from vpltune.renderer.frame.frame import frame_light_records
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.scene import Camera, Light, Scene, Texture, look_at
@@ -43,16 +43,16 @@ class Drawn:
         self.frame = self._runtime._draw(view)
 
     def main_path(self) -> np.ndarray:
-        """The mean picture over four rotations of the point table."""
-        pictures = []
+        """The mean image over four rotations of the point table."""
+        images = []
         for rotation in ROTATIONS:
             frame = self._runtime._draw(self.view, rotation)
-            pictures.append(read_picture(frame.vpl_irradiance)[..., :3])
-        return np.mean(pictures, axis=0)
+            images.append(read_image(frame.vpl_irradiance)[..., :3])
+        return np.mean(images, axis=0)
 
 
 def inside_room(light: str, size=(32, 24)) -> View:
-    """From within the room, so that no silhouette is the picture's edge."""
+    """From within the room, so that no silhouette is the image's edge."""
     camera = Camera(look_at(np.array([0.2, 0.1, 0.95]), np.array([0.0, -0.2, -1.0])), 1.0)
     return View(light, "fitted", size, camera, (ROOM_LIGHTS[light],))
 
@@ -66,8 +66,8 @@ def test_the_full_rsm_has_the_same_energy(gl_context, light):
     """
     drawn = Drawn(gl_context, colored_room(), inside_room(light))
     expected = drawn.main_path().mean()
-    picture = read_picture(GatherFullRsm(gl_context, drawn.frame, stride=2).draw(drawn.view, PARAMETERS))
-    assert picture[..., :3].mean() == pytest.approx(expected, rel=0.02)
+    image = read_image(GatherFullRsm(gl_context, drawn.frame, stride=2).draw(drawn.view, PARAMETERS))
+    assert image[..., :3].mean() == pytest.approx(expected, rel=0.02)
 
 
 def test_the_stride_changes_no_energy(gl_context):
@@ -76,7 +76,7 @@ def test_the_stride_changes_no_energy(gl_context):
     means = []
     for stride in (1, 4):
         full = GatherFullRsm(gl_context, drawn.frame, stride)
-        means.append(read_picture(full.draw(drawn.view, PARAMETERS))[..., :3].mean())
+        means.append(read_image(full.draw(drawn.view, PARAMETERS))[..., :3].mean())
     assert means[0] == pytest.approx(means[1], rel=0.02)
 
 
@@ -86,10 +86,8 @@ def test_read_back_vpls_have_the_same_energy(gl_context, light):
     drawn = Drawn(gl_context, colored_room(), inside_room(light))
     expected = drawn.main_path()
     readback = VplsReadback(gl_context, drawn.frame, 2048)
-    picture = read_picture(
-        readback.draw(drawn.view, readback.place(readback.read(), drawn.records), PARAMETERS)
-    )
-    np.testing.assert_allclose(picture[..., :3].mean(axis=(0, 1)), expected.mean(axis=(0, 1)), rtol=0.05)
+    image = read_image(readback.draw(drawn.view, readback.place(readback.read(), drawn.records), PARAMETERS))
+    np.testing.assert_allclose(image[..., :3].mean(axis=(0, 1)), expected.mean(axis=(0, 1)), rtol=0.05)
 
 
 def test_read_back_texels_are_the_gpus(gl_context):
@@ -112,8 +110,8 @@ def test_traced_rays_have_the_same_energy(gl_context, light):
     drawn = Drawn(gl_context, colored_room(), inside_room(light))
     expected = drawn.main_path()
     traced = RayTracedInstantRadiosity(gl_context, drawn.frame, drawn.scene, 2048)
-    picture = read_picture(traced.draw(drawn.view, PARAMETERS))[..., :3]
-    np.testing.assert_allclose(picture.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), rtol=0.05)
+    image = read_image(traced.draw(drawn.view, PARAMETERS))[..., :3]
+    np.testing.assert_allclose(image.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), rtol=0.05)
 
 
 def test_traced_rays_take_the_texture(gl_context):
@@ -133,7 +131,7 @@ def test_traced_rays_take_the_texture(gl_context):
 
 
 def test_the_screen_holds_all_light_where_all_is_seen(gl_context):
-    """A lit floor and a wall, both in the picture: within 3 % of the VPLs' energy on the wall.
+    """A lit floor and a wall, both in the image: within 3 % of the VPLs' energy on the wall.
 
     The spot's cone is soft, so that its rim falls between pixels without harm.
     """
@@ -145,8 +143,8 @@ def test_the_screen_holds_all_light_where_all_is_seen(gl_context):
     drawn = Drawn(gl_context, scene_of([floor, wall], [(0.6, 0.6, 0.6)]), view)
     expected = drawn.main_path()
     screen = ScreenSpaceOnly(gl_context, drawn.frame, stride=1)
-    picture = read_picture(screen.draw(view, PARAMETERS))[..., :3]
-    assert picture.mean() == pytest.approx(expected.mean(), rel=0.03)
+    image = read_image(screen.draw(view, PARAMETERS))[..., :3]
+    assert image.mean() == pytest.approx(expected.mean(), rel=0.03)
 
 
 def test_the_screen_knows_nothing_of_what_it_does_not_see(gl_context):
@@ -160,5 +158,5 @@ def test_the_screen_knows_nothing_of_what_it_does_not_see(gl_context):
     )
     drawn = Drawn(gl_context, colored_room(), view)
     assert drawn.main_path().mean() > 0.0
-    picture = read_picture(ScreenSpaceOnly(gl_context, drawn.frame).draw(view, PARAMETERS))
-    assert not picture[..., :3].any()
+    image = read_image(ScreenSpaceOnly(gl_context, drawn.frame).draw(view, PARAMETERS))
+    assert not image[..., :3].any()

@@ -8,7 +8,7 @@ import pytest
 
 from vpltune import configs
 from vpltune.__main__ import run
-from vpltune.cli.metrics_table import error_budget_table
+from vpltune.cli.metrics_table import error_breakdown_table
 
 CORNELL = Path(configs.__file__).parent / "scenes" / "cornell-box.glb"
 
@@ -30,7 +30,7 @@ def budgets(tmp_path_factory):
 
 def test_the_causes_add_up(budgets):
     for document in budgets.values():
-        budget = dict(document["error_budget"])
+        budget = dict(document["error_breakdown"])
         assert budget.pop("views") == "fitted"
         assert set(budget) == {"noise", "finite_n", "clamping", "visibility", "filter", "remainder"}
         total = document["metrics"]["fitted"]["tuned"]["relmse"]
@@ -39,7 +39,7 @@ def test_the_causes_add_up(budgets):
 
 def test_without_maps_visibility_is_what_is_wrong(budgets):
     """Most of the error is light through the boxes; maps take most of that share away."""
-    without, with_maps = (budgets[key]["error_budget"] for key in ("transmittance", "maps"))
+    without, with_maps = (budgets[key]["error_breakdown"] for key in ("transmittance", "maps"))
     assert without["visibility"] > 0.5 * budgets["transmittance"]["metrics"]["fitted"]["tuned"]["relmse"]
     assert with_maps["visibility"] < 0.5 * without["visibility"]
 
@@ -48,27 +48,28 @@ def test_the_runtime_is_the_plain_gather(budgets):
     """No filter was used, so its share is what twins differ by: 1e-3 relative RMSE, squared, at most."""
     for document in budgets.values():
         assert (
-            abs(document["error_budget"]["filter"]) < 1e-3 * document["metrics"]["fitted"]["tuned"]["relmse"]
+            abs(document["error_breakdown"]["filter"])
+            < 1e-3 * document["metrics"]["fitted"]["tuned"]["relmse"]
         )
 
 
 def test_the_noise_is_the_floor(budgets):
     for document in budgets.values():
-        assert document["error_budget"]["noise"] == document["metrics"]["fitted"]["noise_floor"]
+        assert document["error_breakdown"]["noise"] == document["metrics"]["fitted"]["noise_floor"]
 
 
 def test_fewer_vpls_are_noisier(budgets):
-    assert np.isfinite(budgets["maps"]["error_budget"]["finite_n"])
-    assert budgets["maps"]["error_budget"]["finite_n"] > 0.0
+    assert np.isfinite(budgets["maps"]["error_breakdown"]["finite_n"])
+    assert budgets["maps"]["error_breakdown"]["finite_n"] > 0.0
 
 
 def test_the_table_is_sorted_and_absent_without_a_split(budgets):
     from rich.console import Console
 
-    assert error_budget_table({"metrics": {}}) == ()
+    assert error_breakdown_table({"metrics": {}}) == ()
     console = Console(width=100)
     with console.capture() as shown:
-        console.print(*error_budget_table(budgets["transmittance"]))
+        console.print(*error_breakdown_table(budgets["transmittance"]))
     lines = [line for line in shown.get().splitlines() if "%" in line]
     assert "visibility" in lines[0]
     assert "remainder" in lines[-2]
@@ -82,7 +83,7 @@ def test_all_bounces_have_a_share_of_their_own(tmp_path, capfd):
     _small_views(views)
     command = ["evaluate", str(CORNELL), "--config", "default", "--views", str(views), "--json"]
     assert run([*command, "--split-error", "--bounces", "all"]) == 0
-    budget = json.loads(capfd.readouterr().out)["error_budget"]
+    budget = json.loads(capfd.readouterr().out)["error_breakdown"]
     assert budget["missing_bounces"] != 0.0
 
 

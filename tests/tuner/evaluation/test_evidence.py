@@ -89,7 +89,7 @@ def test_parameters_that_the_views_leave_open_are_named():
     known = {
         "intensity": replace(interval, determined=False, at_bound=20.0),
         "falloff_footprint": replace(interval, determined=False),
-        "falloff_transmittance": replace(interval, low=0.0, high=0.1),
+        "extinction_coefficient": replace(interval, low=0.0, high=0.1),
     }
     found = undetermined(known, ArtistParameters())
     assert found == (

@@ -1,4 +1,4 @@
-"""pictures.npz: what was drawn is read back, at any scale, within its bounds; what is broken is refused."""
+"""images.npz: what was drawn is read back, at any scale, within its bounds; what is broken is refused."""
 
 import io
 from types import SimpleNamespace
@@ -11,35 +11,35 @@ from vpltune.tuner.evaluation.view_images import (
     MAXIMUM_PIXELS,
     MAXIMUM_VIEWS,
     VARIANTS,
-    read_view_pictures,
-    write_view_pictures,
+    read_view_images,
+    write_view_images,
 )
 
 RANDOM = np.random.default_rng(0)
 
 
 def evaluated(split="fitted", size=(6, 8), unit=1.0):
-    """Stands for an `EvaluatedView` with noise for pictures; `unit` scales all light."""
+    """Stands for an `EvaluatedView` with noise for images; `unit` scales all light."""
 
-    def picture(factor=unit):
+    def image(factor=unit):
         return (factor * RANDOM.random((*size, 3))).astype(np.float32)
 
-    reference = SimpleNamespace(albedo=picture(1.0), direct_irradiance=picture(), irradiance=picture())
-    captured = SimpleNamespace(albedo=picture(1.0), direct_irradiance=picture())
+    reference = SimpleNamespace(albedo=image(1.0), direct_irradiance=image(), irradiance=image())
+    captured = SimpleNamespace(albedo=image(1.0), direct_irradiance=image())
     view = SimpleNamespace(
         view=SimpleNamespace(split=split),
         reference=reference,
         captured=captured,
         valid=RANDOM.random(size) < 0.9,
     )
-    return SimpleNamespace(view=view, irradiance={variant: picture() for variant in VARIANTS})
+    return SimpleNamespace(view=view, irradiance={variant: image() for variant in VARIANTS})
 
 
 @pytest.mark.parametrize("unit", [1e-12, 1.0, 1e12])
-def test_pictures_read_back_within_a_half_floats_rounding(tmp_path, unit):
+def test_images_read_back_within_a_half_floats_rounding(tmp_path, unit):
     drawn = evaluated(unit=unit)
-    write_view_pictures(tmp_path / "pictures.npz", [drawn])
-    (read,) = read_view_pictures(tmp_path / "pictures.npz")
+    write_view_images(tmp_path / "images.npz", [drawn])
+    (read,) = read_view_images(tmp_path / "images.npz")
     assert (read.valid == drawn.view.valid).all()
     # Eleven bits of mantissa: half a unit in the last place is 2**-11 of the value, or 2**-25 at the least.
     close = {"rtol": 2**-11, "atol": 2**-25 * read.level}
@@ -55,16 +55,16 @@ def test_a_black_view_and_one_with_a_spike_are_kept(tmp_path):
     black = evaluated(unit=0.0)
     spike = evaluated()
     spike.irradiance["default"][0, 0] = 1e9
-    write_view_pictures(tmp_path / "pictures.npz", [black, spike])
-    first, second = read_view_pictures(tmp_path / "pictures.npz")
+    write_view_images(tmp_path / "images.npz", [black, spike])
+    first, second = read_view_images(tmp_path / "images.npz")
     assert first.level == 1.0
     assert not first.radiance("tuned").any()
     assert second.indirect["default"][0, 0, 0] == np.finfo(np.float16).max
 
 
 def test_radiance_is_albedo_over_pi_times_irradiance(tmp_path):
-    write_view_pictures(tmp_path / "pictures.npz", [evaluated()])
-    (read,) = read_view_pictures(tmp_path / "pictures.npz")
+    write_view_images(tmp_path / "images.npz", [evaluated()])
+    (read,) = read_view_images(tmp_path / "images.npz")
     expected = read.reference_albedo / np.pi * (read.reference_direct + read.indirect["reference"])
     np.testing.assert_allclose(read.radiance("reference"), expected, rtol=1e-6)
     expected = read.albedo / np.pi * (read.direct + read.indirect["ceiling"])
@@ -73,23 +73,23 @@ def test_radiance_is_albedo_over_pi_times_irradiance(tmp_path):
 
 def test_the_file_is_bounded(tmp_path):
     """Large views lose pixels, not their edges; of many views the first of each split stay."""
-    write_view_pictures(tmp_path / "large.npz", [evaluated(size=(601, 800))])
-    (read,) = read_view_pictures(tmp_path / "large.npz")
+    write_view_images(tmp_path / "large.npz", [evaluated(size=(601, 800))])
+    (read,) = read_view_images(tmp_path / "large.npz")
     assert read.valid.shape == (151, 200)
     assert read.valid.size <= MAXIMUM_PIXELS
     many = [evaluated("fitted" if index < 30 else "held_out", size=(2, 2)) for index in range(45)]
-    write_view_pictures(tmp_path / "many.npz", many)
-    kept = [view.index for view in read_view_pictures(tmp_path / "many.npz")]
+    write_view_images(tmp_path / "many.npz", many)
+    kept = [view.index for view in read_view_images(tmp_path / "many.npz")]
     assert kept == [*range(MAXIMUM_VIEWS["fitted"]), *range(30, 30 + MAXIMUM_VIEWS["held_out"])]
 
 
-def test_no_file_is_no_pictures(tmp_path):
-    assert read_view_pictures(tmp_path / "pictures.npz") == ()
+def test_no_file_is_no_images(tmp_path):
+    assert read_view_images(tmp_path / "images.npz") == ()
 
 
 def test_what_is_broken_is_refused_by_name(tmp_path):
-    path = tmp_path / "pictures.npz"
-    write_view_pictures(path, [evaluated()])
+    path = tmp_path / "images.npz"
+    write_view_images(path, [evaluated()])
     whole = path.read_bytes()
     flipped = bytearray(whole)
     flipped[len(whole) // 2] ^= 0x55
@@ -97,17 +97,17 @@ def test_what_is_broken_is_refused_by_name(tmp_path):
     np.save(lone_array, np.zeros(3))
     for content in (whole[: len(whole) // 2], bytes(flipped), bytes(len(whole)), lone_array.getvalue(), b""):
         path.write_bytes(content)
-        with pytest.raises(InputError, match=r"pictures.npz: not a readable pictures.npz"):
-            read_view_pictures(path)
+        with pytest.raises(InputError, match=r"images.npz: not a readable images.npz"):
+            read_view_images(path)
     with np.load(io.BytesIO(whole)) as archive:
         members = {name: archive[name] for name in archive.files}
     for name, wrong, message in (
         ("0/direct", None, "member 0/direct is missing"),
         ("0/direct", np.zeros((6, 8, 3), np.float32), r"0/direct must be \(6, 8\) finite half floats"),
         ("0/direct", np.full((6, 8, 3), np.nan, np.float16), "finite half floats"),
-        ("0/valid", np.ones((6, 8, 3), bool), "0/valid must be a picture"),
+        ("0/valid", np.ones((6, 8, 3), bool), "0/valid must be an image"),
     ):
         changed = {key: value for key, value in {**members, name: wrong}.items() if value is not None}
         np.savez_compressed(path, **changed)
         with pytest.raises(InputError, match=message):
-            read_view_pictures(path)
+            read_view_images(path)

@@ -51,11 +51,11 @@ def test_a_start_that_is_best_keeps_its_views(gl_context):
 
 def test_candidates_are_the_placement_halfway_and_tuned():
     """Halfway on each parameter's own scale; what equals the start, or another, is not tried twice."""
-    base = replace(START, density_relaxation=2, falloff_footprint=1.0)
-    tuned = replace(base, intensity=4.0, falloff_transmittance=1.0)
+    base = replace(START, lloyd_iterations=2, falloff_footprint=1.0)
+    tuned = replace(base, intensity=4.0, extinction_coefficient=1.0)
     half = between(base, tuned, 0.5)
     assert half.intensity == pytest.approx(2.0)
-    assert half.falloff_transmittance == pytest.approx(0.5)
+    assert half.extinction_coefficient == pytest.approx(0.5)
     assert placement(half) == placement(tuned)
     assert list(candidates(START, base, tuned, None)) == ["placement", "halfway", "tuned"]
     assert list(candidates(START, START, START, None)) == []

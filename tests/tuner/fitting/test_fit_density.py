@@ -84,8 +84,8 @@ def test_views_share_their_first_rotation_alone():
     assert all(0.0 <= x < 1.0 for rotation in third for x in rotation)
 
 
-def test_error_is_of_the_rotated_picture(room):
-    """Each rotation has an error of its own, and many VPLs have none against their own picture."""
+def test_error_is_of_the_rotated_image(room):
+    """Each rotation has an error of its own, and many VPLs have none against their own image."""
     runtime, view = room
     errors = rotation_errors(runtime, (view,), FEW, table_rotations(3, 0))
     assert errors.shape == (1, 3)

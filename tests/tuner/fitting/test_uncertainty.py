@@ -24,7 +24,7 @@ TILES_APART = np.array([[1.02, 1.07], [0.93, 0.98]])
 
 
 def floor_view(height, planted, noise=0.0, misfit=None, seed=0, footprint=0.2):
-    """A floor of 2 × 2 under nine VPLs at a height; `misfit` multiplies the picture, tile by tile."""
+    """A floor of 2 × 2 under nine VPLs at a height; `misfit` multiplies the image, tile by tile."""
     random = np.random.default_rng(seed)
     across, along = np.meshgrid(np.linspace(-1.0, 1.0, SIZE[0]), np.linspace(-1.0, 1.0, SIZE[1]))
     floor = np.stack([across.ravel(), along.ravel(), np.zeros(across.size)], axis=1)
@@ -40,19 +40,19 @@ def floor_view(height, planted, noise=0.0, misfit=None, seed=0, footprint=0.2):
         array(np.full(9, footprint)),
         array(np.full((9, 3), 1.0 / 9.0)),
     )
-    picture = np.asarray(gather(receivers, vpls, FalloffParameters.of(planted)))
+    image = np.asarray(gather(receivers, vpls, FalloffParameters.of(planted)))
     if misfit is not None:
         tiles = np.repeat(np.repeat(misfit, SIZE[1] // 2, axis=0), SIZE[0] // 2, axis=1)
-        picture = picture * tiles.reshape(-1, 1)
+        image = image * tiles.reshape(-1, 1)
     halves = [
-        (picture * (1.0 + noise * random.standard_normal(picture.shape))).astype(np.float32) for _ in range(2)
+        (image * (1.0 + noise * random.standard_normal(image.shape))).astype(np.float32) for _ in range(2)
     ]
     return fit_view(receivers, vpls, None, *halves, np.arange(SIZE[0] * SIZE[1]), SIZE)
 
 
 def test_a_clean_problem_has_narrow_intervals():
     """Noise of 2 % over 7,200 values: everything within 3 %, and the truth inside with room for the table."""
-    planted = replace(PRIOR, intensity=1.3, falloff_footprint=1.2, falloff_transmittance=0.5)
+    planted = replace(PRIOR, intensity=1.3, falloff_footprint=1.2, extinction_coefficient=0.5)
     views = tuple(floor_view(height, planted, 0.02, seed=i) for i, height in enumerate((0.15, 0.4)))
     tuned, _, found = fit_with_intervals(views, PRIOR)
     for name, interval in found.items():
@@ -78,16 +78,16 @@ def test_what_the_views_leave_open_goes_to_the_prior():
 
 def test_parameters_that_do_the_same_are_named():
     """At one and the same distance, the transmittance is but another intensity."""
-    planted = replace(PRIOR, intensity=1.1, falloff_footprint=0.8, falloff_transmittance=0.4)
+    planted = replace(PRIOR, intensity=1.1, falloff_footprint=0.8, extinction_coefficient=0.4)
     views = tuple(floor_view(2.0, planted, 0.02, TILES_APART, seed=i, footprint=0.5) for i in range(2))
     _, _, found = fit_with_intervals(views, PRIOR)
-    assert "falloff_transmittance" in found["intensity"].trades_with
-    assert "intensity" in found["falloff_transmittance"].trades_with
+    assert "extinction_coefficient" in found["intensity"].trades_with
+    assert "intensity" in found["extinction_coefficient"].trades_with
 
 
 def test_misfit_widens_the_intervals():
     """Tiles that disagree by 10 % leave k open by about as much, however little noise there is."""
-    planted = replace(PRIOR, intensity=1.3, falloff_footprint=1.2, falloff_transmittance=0.5)
+    planted = replace(PRIOR, intensity=1.3, falloff_footprint=1.2, extinction_coefficient=0.5)
     misfit = np.array([[1.0, 1.2], [0.85, 1.05]])
     widths = []
     for field in (None, misfit):
@@ -97,11 +97,11 @@ def test_misfit_widens_the_intervals():
     assert widths[0] < 1.1 < widths[1]
 
 
-def test_a_tabulated_picture_is_in_the_view():
-    """The intervals' own picture is the fit's: the same table, at the receivers themselves."""
+def test_a_tabulated_image_is_in_the_view():
+    """The intervals' own image is the fit's: the same table, at the receivers themselves."""
     view = floor_view(0.4, PRIOR)
-    picture = np.asarray(gather_tabulated(view.table, FalloffParameters.of(PRIOR)))
-    np.testing.assert_allclose(picture, view.target.half_a, rtol=1e-2)
+    image = np.asarray(gather_tabulated(view.table, FalloffParameters.of(PRIOR)))
+    np.testing.assert_allclose(image, view.target.half_a, rtol=1e-2)
     assert sorted(set(np.asarray(view.tile).tolist())) == [0, 1, 2, 3]
 
 

@@ -87,7 +87,7 @@ def test_pixels_that_no_parameter_can_mend_do_not_rule_a_fit(gl_context):
     start = ArtistParameters(vpl_count=256)
     runtime.parameters = start
     drawn = CapturedView(view, reference, runtime.capture(view))
-    held = frozenset({"falloff_transmittance"})
+    held = frozenset({"extinction_coefficient"})
     plain = fit_placement((drawn,), start, held=held).parameters
     robust = fit_placement((drawn,), start, robust_errors((drawn,)), held=held).parameters
     dimmed, kept = (1.0 - each.intensity / PLANTED.intensity for each in (plain, robust))

@@ -22,30 +22,30 @@ from vpltune.tuner.surrogate.captured_view import CapturedView
 GREY, BLACK = np.full((4, 3), 0.5, np.float32), np.zeros((4, 3), np.float32)
 
 
-def test_of_a_grey_picture():
+def test_of_a_grey_image():
     """Half as bright: (0.5 − 0.25)² / (0.5² + 0.01·0.5²) = 0.25/1.01."""
     assert relmse(0.5 * GREY, GREY) == pytest.approx(0.25 / 1.01)
     assert energy_ratio(0.5 * GREY, GREY) == pytest.approx(0.5)
     assert median_error(0.5 * GREY, GREY) == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize("picture", [GREY, BLACK])
-def test_against_a_black_reference_there_is_no_value(picture):
-    assert math.isnan(relmse(picture, BLACK))
-    assert math.isnan(energy_ratio(picture, BLACK))
-    assert math.isnan(median_error(picture, BLACK))
-    assert all(math.isnan(value) for value in trimmed_relmse(picture, BLACK))
+@pytest.mark.parametrize("image", [GREY, BLACK])
+def test_against_a_black_reference_there_is_no_value(image):
+    assert math.isnan(relmse(image, BLACK))
+    assert math.isnan(energy_ratio(image, BLACK))
+    assert math.isnan(median_error(image, BLACK))
+    assert all(math.isnan(value) for value in trimmed_relmse(image, BLACK))
 
 
 def test_without_the_worst_pixel_in_a_thousand():
     """2,000 pixels off by 1 %, two of them by a factor of 11: the two hold all but a thousandth of relMSE."""
     reference = np.ones((2000, 3), np.float32)
-    picture = 1.01 * reference
-    picture[[7, 1234]] = 11.0
-    trimmed, share = trimmed_relmse(picture, reference)
+    image = 1.01 * reference
+    image[[7, 1234]] = 11.0
+    trimmed, share = trimmed_relmse(image, reference)
     assert trimmed == pytest.approx(1e-4 / 1.01, rel=1e-3)
     assert share == pytest.approx(1.0 - 1998 * 1e-4 / (1998 * 1e-4 + 200.0), rel=1e-6)
-    assert median_error(picture, reference) == pytest.approx(0.01, rel=1e-3)
+    assert median_error(image, reference) == pytest.approx(0.01, rel=1e-3)
 
 
 def test_a_pixel_alone_is_kept_and_no_error_has_no_worst():

@@ -37,7 +37,7 @@ PARAMETERS = ArtistParameters(vpl_count=32)
 
 @pytest.fixture(scope="module")
 def view(gl_context) -> CapturedView:
-    """The room, and as its reference twice the runtime's own picture with other parameters, with noise."""
+    """The room, and as its reference twice the runtime's own image with other parameters, with noise."""
     gl_context.__enter__()
     truth = replace(PARAMETERS, intensity=1.4, falloff_footprint=1.0)
     runtime = Runtime(
@@ -77,8 +77,8 @@ def direct_loss(view: CapturedView, point: np.ndarray) -> float:
     reference, direct, drawn = (image.reshape(-1, 3)[flat] for image in images)
     weight = robust_error(reference, direct, drawn).weights(drawn)
     target = target_of(*(half.reshape(-1, 3)[flat] for half in halves), weight)
-    picture = gather(receivers, vpls, FalloffParameters.of(parameters), seen)
-    return float(weighted_squared_error(picture, target))
+    image = gather(receivers, vpls, FalloffParameters.of(parameters), seen)
+    return float(weighted_squared_error(image, target))
 
 
 @pytest.mark.parametrize("seed", range(3))

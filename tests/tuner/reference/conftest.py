@@ -224,7 +224,7 @@ def _stock_emitter(mi, light: Light) -> dict:
     cosine = 1.0 / np.sqrt(1.0 + across[None, :] ** 2 + across[:, None] ** 2)
     cos_inner, cos_outer = np.cos(light.inner_cone), np.cos(light.outer_cone)
     falloff = np.clip((cosine - cos_outer) / (cos_inner - cos_outer), 0.0, 1.0) ** 2
-    picture = mi.Bitmap(np.repeat(falloff[..., None], 3, axis=2).astype(np.float32))
+    image = mi.Bitmap(np.repeat(falloff[..., None], 3, axis=2).astype(np.float32))
     origin = light.position_world
     up = [0.0, 0.0, 1.0] if abs(light.direction_world[2]) < 0.9 else [0.0, 1.0, 0.0]
     degrees = float(np.degrees(light.outer_cone))
@@ -236,5 +236,5 @@ def _stock_emitter(mi, light: Light) -> dict:
         "intensity": intensity,
         "cutoff_angle": degrees,
         "beam_width": degrees * 0.99999,
-        "texture": {"type": "bitmap", "bitmap": picture, "raw": True, "wrap_mode": "clamp"},
+        "texture": {"type": "bitmap", "bitmap": image, "raw": True, "wrap_mode": "clamp"},
     }

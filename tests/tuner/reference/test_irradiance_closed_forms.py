@@ -196,7 +196,7 @@ def test_texture_wraps_each_way_by_its_own_mode_with_v_down(shapes, wrap_u, wrap
     texels = np.random.default_rng(1).integers(0, 256, (2, 4, 3), dtype=np.uint8)
     texture = Texture("checker", texels, wrap_u, wrap_v)
     quad = shapes.quad_mesh([0, 0, 0], [4, 0, 0], [0, 4, 0])
-    # v grows downwards in the picture, as rows do.
+    # v grows downwards in the image, as rows do.
     uv = np.array([[-1.5, 2.5], [2.5, 2.5], [2.5, -1.5], [-1.5, -1.5]], np.float32)
     factor = np.array([0.9, 0.8, 0.7], np.float32)
     scene = shapes.scene_of([replace(quad, uv=uv)], [Material("painted", factor, 0)], [texture])

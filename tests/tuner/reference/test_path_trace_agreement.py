@@ -34,7 +34,7 @@ def z_scores(mitsuba, shapes, scene: Scene, view: View, rounds: int):
             variance += of_mean[valid] / rounds**2
     reflected = (ours.irradiance * ours.albedo / np.pi)[valid]
     # Half the squared difference of two halves is, on average, the variance of one: here as a share of the
-    # plain one, over the whole picture.
+    # plain one, over the whole image.
     own = ((ours.irradiance_a - ours.irradiance_b) * ours.albedo / np.pi)[valid] ** 2 / 4.0
     # A thousandth of the mean: for nearly black pixels that a handful of plain paths have lit, if any, whose
     # variance is therefore not known. Plain means of 16 million samples, made once for three such pixels
@@ -44,7 +44,7 @@ def z_scores(mitsuba, shapes, scene: Scene, view: View, rounds: int):
 
 
 def check(scores: np.ndarray, ratio: float) -> None:
-    # Šidák (1967): as many tests as there are pixels and channels, one false alarm in a hundred pictures.
+    # Šidák (1967): as many tests as there are pixels and channels, one false alarm in a hundred images.
     threshold = norm.isf((1.0 - (1.0 - SIGNIFICANCE) ** (1.0 / scores.size)) / 2.0)
     passed = np.mean((np.abs(scores) < threshold).all(axis=1))
     assert passed >= SHARE_THAT_PASSES, f"{passed:.4%} of pixels pass, largest z {np.abs(scores).max():.1f}"

@@ -14,7 +14,7 @@ from vpltune.renderer.scene.scene import scaled
 from vpltune.renderer.scene.views import scaled_view
 from vpltune.tuner.reference import ReferenceView, cache, noise_floor, reference_views
 
-PICTURES = ("irradiance_a", "irradiance_b", "direct_irradiance", "albedo", "position_world", "normal_world")
+IMAGES = ("irradiance_a", "irradiance_b", "direct_irradiance", "albedo", "position_world", "normal_world")
 
 
 def no_cache(monkeypatch, tmp_path):
@@ -22,8 +22,8 @@ def no_cache(monkeypatch, tmp_path):
 
 
 def same(a: ReferenceView, b: ReferenceView) -> bool:
-    pictures = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in (*PICTURES, "valid"))
-    return pictures and a.samples == b.samples
+    images = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in (*IMAGES, "valid"))
+    return images and a.samples == b.samples
 
 
 def test_same_seed_same_bits_and_another_seed_others(shapes, monkeypatch, tmp_path):
@@ -115,7 +115,7 @@ def test_anything_that_matters_makes_another_reference(shapes, monkeypatch, tmp_
     def counted(scene, view, *rest):
         made.append(view)
         return ReferenceView(
-            **{name: np.zeros((6, 8, 3), np.float32) for name in PICTURES}
+            **{name: np.zeros((6, 8, 3), np.float32) for name in IMAGES}
             | {"position_world": np.zeros((6, 8, 3)), "valid": np.zeros((6, 8), bool), "samples": 1}
         )
 

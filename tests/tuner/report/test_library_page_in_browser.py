@@ -158,7 +158,7 @@ def test_the_filter_looks_at_names_status_and_reasons(chromium, library):
 def test_a_scene_links_to_its_page_and_back(chromium, library):
     with opened(chromium, library, ready=None) as shown:
         shown.page.click("text=cellar.glb")
-        shown.drawn("picture 0")
+        shown.drawn("image 0")
         assert shown.page.inner_text("h1") == "cellar.glb"
         shown.page.click("text=Library")
         # A fit that had nothing to fit has a page as well.

@@ -11,7 +11,7 @@ from PIL import Image
 
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
 from vpltune.tuner.metrics.error_maps import DIVERGING, MAGMA, map_png, signed_error
-from vpltune.tuner.metrics.tone_curve import display_picture, tone_curve
+from vpltune.tuner.metrics.tone_curve import display_image, tone_curve
 from vpltune.tuner.metrics.view_metrics import hdr_flip, hdr_flip_map, relmse
 from vpltune.tuner.report.charts import bar_chart, loss_chart, pareto_chart
 from vpltune.tuner.report.page_text import NONE, change, number, seconds
@@ -116,7 +116,7 @@ def test_the_tone_curve_is_the_runtimes(gl_context):
     linear = np.random.default_rng(0).lognormal(-1.0, 2.0, (48, 64, 3)).astype(np.float32)
     for exposure in (0.1, 1.0, 30.0):
         drawn = runtime.display(linear, exposure).astype(int)
-        assert np.abs(drawn - display_picture(linear, exposure)).max() <= 1
+        assert np.abs(drawn - display_image(linear, exposure)).max() <= 1
 
 
 def test_signed_error_has_the_sign_of_the_error_and_the_scale_of_relmse():
@@ -129,7 +129,7 @@ def test_signed_error_has_the_sign_of_the_error_and_the_scale_of_relmse():
     assert not darker[~valid].any()
     grey = random.random((20, 30, 1)) * np.ones(3)
     error = signed_error(grey, reference, valid)[valid]
-    # On grey pictures luminance is every channel, and the mean square is relMSE itself.
+    # On grey images luminance is every channel, and the mean square is relMSE itself.
     assert np.mean(error**2) == pytest.approx(relmse(grey[valid], reference[valid]), rel=1e-9)
 
 
@@ -143,8 +143,8 @@ def test_signed_error_without_light_is_none_or_all():
 def test_a_map_has_the_colours_of_its_legend_and_is_transparent_where_nothing_is():
     values = np.array([[-9.0, -1.0, 0.0, 1.0, np.inf, 0.0]])
     valid = np.array([[True, True, True, True, True, False]])
-    with Image.open(io.BytesIO(map_png(values, -1.0, 1.0, DIVERGING, valid))) as picture:
-        pixels = np.asarray(picture.convert("RGBA"))[0]
+    with Image.open(io.BytesIO(map_png(values, -1.0, 1.0, DIVERGING, valid))) as image:
+        pixels = np.asarray(image.convert("RGBA"))[0]
     shown = ["#" + "".join(f"{channel:02x}" for channel in pixel[:3]) for pixel in pixels[:5]]
     assert shown == [DIVERGING[0], DIVERGING[0], DIVERGING[5], DIVERGING[-1], DIVERGING[-1]]
     assert pixels[:, 3].tolist() == [255] * 5 + [0]
@@ -164,12 +164,12 @@ def test_magma_is_even_in_lightness():
 def test_the_flip_map_has_hdr_flip_as_its_mean():
     random = np.random.default_rng(0)
     reference = random.lognormal(0.0, 1.5, (24, 32, 3)).astype(np.float32)
-    picture = (reference * random.uniform(0.5, 1.5, (24, 32, 1))).astype(np.float32)
-    errors = hdr_flip_map(picture, reference)
+    image = (reference * random.uniform(0.5, 1.5, (24, 32, 1))).astype(np.float32)
+    errors = hdr_flip_map(image, reference)
     assert errors.shape == (24, 32)
-    assert hdr_flip(picture, reference) == pytest.approx(float(errors.mean()), rel=1e-6)
-    assert not hdr_flip_map(0.0 * picture, 0.0 * reference).any()
-    assert (hdr_flip_map(picture, 0.0 * reference) == 1.0).all()
+    assert hdr_flip(image, reference) == pytest.approx(float(errors.mean()), rel=1e-6)
+    assert not hdr_flip_map(0.0 * image, 0.0 * reference).any()
+    assert (hdr_flip_map(image, 0.0 * reference) == 1.0).all()
 
 
 def test_a_loss_curve_goes_down_the_page_as_the_loss_falls():
@@ -233,7 +233,7 @@ def test_uncertainty_is_an_interval_a_source_and_what_it_trades_with():
     doubt = {
         "intensity": {"low": 0.5, "high": 2.0, "determined": True, "trades_with": []},
         "falloff_footprint": {"low": 0.05, "high": 20.0, "determined": False, "trades_with": ["intensity"]},
-        "falloff_transmittance": {"low": None, "high": 2.0},
+        "extinction_coefficient": {"low": None, "high": 2.0},
     }
     rows = {row.name: row for row in parameter_rows(ArtistParameters().as_dict(), doubt)}
     left, width = rows["intensity"].bar.interval
@@ -243,7 +243,7 @@ def test_uncertainty_is_an_interval_a_source_and_what_it_trades_with():
     assert rows["intensity"].source == "the scene"
     assert rows["falloff_footprint"].source == "the prior"
     assert rows["falloff_footprint"].trades_with == "intensity"
-    assert rows["falloff_transmittance"].bar.interval is None
+    assert rows["extinction_coefficient"].bar.interval is None
 
 
 def test_parameters_of_another_version_are_told_as_they_are():

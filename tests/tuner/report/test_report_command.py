@@ -74,10 +74,10 @@ def test_values_that_are_no_numbers_are_dashes(fit_copy):
     assert "Loss at every step" not in page
 
 
-def test_a_fit_without_pictures_has_a_page_all_the_same(fit_copy):
-    (fit_copy / "pictures.npz").unlink()
+def test_a_fit_without_images_has_a_page_all_the_same(fit_copy):
+    (fit_copy / "images.npz").unlink()
     page = scene_page(read_fit_folder(fit_copy))
-    assert "kept no pictures" in page
+    assert "kept no images" in page
     assert "Against the path tracer" in page
 
 
@@ -92,22 +92,22 @@ def test_many_large_noisy_views_do_not_make_a_page_too_large(fit_copy):
     def noise():
         return random.lognormal(0.0, 2.0, (*shape, 3)).astype(np.float32)
 
-    pictures = tuple(
+    images = tuple(
         replace(
-            fit.pictures[0],
+            fit.images[0],
             index=index,
             valid=np.ones(shape, bool),
             reference_albedo=noise() / 1e3,
             reference_direct=noise(),
             albedo=noise() / 1e3,
             direct=noise(),
-            indirect={name: noise() for name in fit.pictures[0].indirect},
+            indirect={name: noise() for name in fit.images[0].indirect},
         )
         for index in range(8)
     )
     measured = [{**fit.document["per_view"][0], "name": f"noisy_{index}"} for index in range(8)]
     document = {**fit.document, "per_view": measured}
-    page = scene_page(replace(fit, pictures=pictures, document=document))
+    page = scene_page(replace(fit, images=images, document=document))
     assert len(page.encode("utf-8")) < MAXIMUM_PAGE_BYTES
     assert "more views were measured" in page
     assert page.count('class="view"') >= 1
@@ -139,7 +139,7 @@ PARTS = (
     "seconds",
     "loss",
     "uncertainty",
-    "error_budget",
+    "error_breakdown",
     "budget",
     "per_view",
     "pareto",

@@ -1,4 +1,4 @@
-"""A fit's page in a real browser: pictures, slider, exposure, keys, print, dark, narrow, no script."""
+"""A fit's page in a real browser: images, slider, exposure, keys, print, dark, narrow, no script."""
 
 import json
 
@@ -8,8 +8,8 @@ from opened_page import opened
 from planted_metrics import PLANTED, change_metrics
 
 from vpltune.__main__ import run
-from vpltune.tuner.evaluation.view_images import VARIANTS, read_view_pictures
-from vpltune.tuner.metrics.tone_curve import display_picture
+from vpltune.tuner.evaluation.view_images import VARIANTS, read_view_images
+from vpltune.tuner.metrics.tone_curve import display_image
 from vpltune.tuner.report.fit_folder import read_fit_folder
 from vpltune.tuner.report.page_template import MAXIMUM_PAGE_BYTES
 from vpltune.tuner.report.scene_page import scene_page
@@ -25,8 +25,8 @@ def page_path(fitted_folder):
 
 
 @pytest.fixture(scope="module")
-def pictures(fitted_folder):
-    return read_view_pictures(fitted_folder / "pictures.npz")
+def images(fitted_folder):
+    return read_view_images(fitted_folder / "images.npz")
 
 
 def test_it_opens_without_a_complaint_or_a_request_and_is_small(chromium, page_path):
@@ -54,19 +54,19 @@ def test_the_page_itself_forbids_requests(chromium, page_path):
         assert shown.page.evaluate("window.ran") is None
         assert all("Content Security Policy" in problem for problem in shown.problems)
         assert len(shown.problems) >= 3
-        # Chromium announces a picture's request before the policy stops it.
+        # Chromium announces an image's request before the policy stops it.
         assert shown.requests == [address for address, _ in failures]
         assert all(reason == "csp" for _, reason in failures)
 
 
-def test_exposure_is_live_on_linear_values(chromium, page_path, pictures):
+def test_exposure_is_live_on_linear_values(chromium, page_path, images):
     """Every canvas shows what the numpy twin of the tone curve makes of the half floats on disk."""
-    exposures = view_block(pictures[0], {}).linear["exposures"]
+    exposures = view_block(images[0], {}).linear["exposures"]
     with opened(chromium, page_path) as shown:
         shown.page.select_option("#layout", "side")
         for quantity, stops, words in (
-            ("picture", 0, "±0.0 EV"),
-            ("picture", 2.5, "+2.5 EV"),
+            ("image", 0, "±0.0 EV"),
+            ("image", 2.5, "+2.5 EV"),
             ("irradiance", 2.5, "+2.5 EV"),
             ("irradiance", -4, "−4.0 EV"),
         ):
@@ -75,9 +75,9 @@ def test_exposure_is_live_on_linear_values(chromium, page_path, pictures):
             shown.drawn(f"{quantity} {stops}")
             assert shown.page.locator(".exposure output").inner_text() == words
             for variant in SHOWN:
-                whole = pictures[0].radiance(variant)
-                linear = whole if quantity == "picture" else pictures[0].indirect[variant]
-                expected = display_picture(linear, exposures[quantity] * 2.0**stops).astype(int)
+                whole = images[0].radiance(variant)
+                linear = whole if quantity == "image" else images[0].indirect[variant]
+                expected = display_image(linear, exposures[quantity] * 2.0**stops).astype(int)
                 # The page multiplies radiance out in another order: it may fall on the other side of a step.
                 assert np.abs(shown.canvas(variant).astype(int) - expected).max() <= 1
 
@@ -86,17 +86,17 @@ def test_exposure_changes_what_is_seen_and_reset_brings_it_back(chromium, page_p
     with opened(chromium, page_path) as shown:
         before = shown.photograph(".stack")
         shown.page.locator("#exposure").fill("3")
-        shown.drawn("picture 3")
+        shown.drawn("image 3")
         brighter = shown.photograph(".stack")
         assert brighter.mean() > before.mean() + 20.0
         shown.page.click("#reset")
-        shown.drawn("picture 0")
+        shown.drawn("image 0")
         shown.page.mouse.move(0, 0)
         np.testing.assert_array_equal(shown.photograph(".stack"), before)
 
 
 def test_the_slider_parts_left_from_right(chromium, page_path):
-    """At its ends one picture is seen whole; between them each on its side; by mouse and by keyboard."""
+    """At its ends one image is seen whole; between them each on its side; by mouse and by keyboard."""
     with opened(chromium, page_path) as shown:
         page = shown.page
         page.select_option("#left", "default")
@@ -141,7 +141,7 @@ def test_side_by_side_shows_all_four(chromium, page_path):
         assert len({box["y"] for box in boxes}) == 1
 
 
-def test_pointing_at_a_pixel_reads_its_values(chromium, page_path, pictures):
+def test_pointing_at_a_pixel_reads_its_values(chromium, page_path, images):
     with opened(chromium, page_path) as shown:
         canvas = shown.page.locator(".truth canvas").first
         # What a fit ends with may take several lines above it.
@@ -149,7 +149,7 @@ def test_pointing_at_a_pixel_reads_its_values(chromium, page_path, pictures):
         box = canvas.bounding_box()
         shown.page.mouse.move(box["x"] + (40.5 / 64) * box["width"], box["y"] + (30.5 / 48) * box["height"])
         text = shown.page.locator(".probe output").first.inner_text()
-        luminance = pictures[0].level * pictures[0].indirect["reference"][30, 40] @ [0.2126, 0.7152, 0.0722]
+        luminance = images[0].level * images[0].indirect["reference"][30, 40] @ [0.2126, 0.7152, 0.0722]
         assert "Pixel 40, 30" in text
         assert f"indirect irradiance {luminance:#.3g} W/m²" in text
         assert "tuned" in text
@@ -217,10 +217,10 @@ def test_no_width_needs_scrolling_sideways(chromium, page_path, width):
 def test_in_print_sliders_lie_side_by_side(chromium, page_path):
     with opened(chromium, page_path) as shown:
         shown.page.locator("#exposure").fill("2")
-        shown.drawn("picture 2")
+        shown.drawn("image 2")
         shown.page.emulate_media(media="print")
-        # On paper every picture has the exposure, those too that were not seen on the screen.
-        drawn = ".view canvas:not([data-drawn='picture 2'])"
+        # On paper every image has the exposure, those too that were not seen on the screen.
+        drawn = ".view canvas:not([data-drawn='image 2'])"
         shown.page.wait_for_function("drawn => !document.querySelector(drawn)", arg=drawn)
         assert shown.page.locator(".view canvas").count() == 10
         stack = shown.page.locator(".stack").first
@@ -235,13 +235,13 @@ def test_in_print_sliders_lie_side_by_side(chromium, page_path):
         assert shown.page.pdf(format="A4", print_background=True).startswith(b"%PDF-")
 
 
-def test_without_a_script_pictures_are_there_all_the_same(chromium, page_path, pictures):
+def test_without_a_script_images_are_there_all_the_same(chromium, page_path, images):
     with opened(chromium, page_path, ready=None, java_script_enabled=False) as shown:
         stack = shown.page.locator(".stack").first
         assert all(image.is_visible() for image in stack.locator("img").all())
         assert not shown.page.locator(".toolbar").is_visible()
-        exposure = view_block(pictures[0], {}).linear["exposures"]["picture"]
-        expected = display_picture(pictures[0].radiance("tuned"), exposure)
+        exposure = view_block(images[0], {}).linear["exposures"]["image"]
+        expected = display_image(images[0].radiance("tuned"), exposure)
         seen = shown.photograph('.stack figure[data-variant="tuned"] img')
         assert seen.mean(axis=(0, 1)) == pytest.approx(expected.mean(axis=(0, 1)), abs=3.0)
 
@@ -287,7 +287,7 @@ def test_names_from_scenes_are_text_and_nothing_else(chromium, fit_copy):
         provenance={HOSTILE: HOSTILE, "command": HOSTILE},
         parameters={**document["parameters"], HOSTILE: 1.0},
         seconds={**document["seconds"], HOSTILE: 2.0},
-        error_budget={"views": HOSTILE, HOSTILE: 1.0},
+        error_breakdown={"views": HOSTILE, HOSTILE: 1.0},
         uncertainty={"intensity": {"low": 0.5, "high": 2.0, "determined": True, "trades_with": [HOSTILE]}},
         pareto=[{"milliseconds": 1.0, "relmse": 1.0, "choice": {HOSTILE: HOSTILE}, "config": HOSTILE}],
         budget={"choice": {HOSTILE: HOSTILE}, "frame_size": [HOSTILE, 1]},

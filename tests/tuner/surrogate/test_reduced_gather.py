@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vpltune.tuner.metrics.relative_squared_error import target_of, weighted_squared_error
-from vpltune.tuner.surrogate.reduced_gather import reduce_gather, reduced_picture
+from vpltune.tuner.surrogate.reduced_gather import reduce_gather, reduced_image
 from vpltune.tuner.surrogate.tabulated_gather import gather_tabulated, tabulate_gather
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
 from vpltune.tuner.surrogate.vpl_gather import FalloffParameters
@@ -15,7 +15,7 @@ from vpltune.tuner.surrogate.vpl_gather import FalloffParameters
 
 @pytest.fixture(scope="module")
 def view():
-    """1,500 receivers on a floor under 40 VPLs, and a noisy reference of its picture."""
+    """1,500 receivers on a floor under 40 VPLs, and a noisy reference of its image."""
     random = np.random.default_rng(3)
     floor = np.concatenate([random.uniform(-1.0, 1.0, (1500, 2)), np.zeros((1500, 1))], axis=1)
     ceiling = np.concatenate([random.uniform(-1.0, 1.0, (40, 2)), np.ones((40, 1))], axis=1)
@@ -31,9 +31,9 @@ def view():
         array(random.uniform(0.0, 1.0, (40, 3))),
     )
     table = tabulate_gather(receivers, vpls)
-    picture = np.asarray(gather_tabulated(table, parameters(0.9, 1.5, 0.4)))
+    image = np.asarray(gather_tabulated(table, parameters(0.9, 1.5, 0.4)))
     halves = [
-        (picture * (1.0 + 0.2 * random.standard_normal(picture.shape))).astype(np.float32) for _ in range(2)
+        (image * (1.0 + 0.2 * random.standard_normal(image.shape))).astype(np.float32) for _ in range(2)
     ]
     return table, halves
 
@@ -44,14 +44,14 @@ def parameters(*values):
 
 @pytest.mark.parametrize("values", [(1.0, 0.5, 0.0), (0.9, 1.5, 0.4), (0.05, 20.0, 8.0), (20.0, 0.05, 0.0)])
 def test_same_loss(view, values):
-    """To 2e-6 of the sum of squares of picture and target: sums of 4,500 float32 products, in two orders."""
+    """To 2e-6 of the sum of squares of image and target: sums of 4,500 float32 products, in two orders."""
     table, halves = view
     target = target_of(*halves)
     reduced = reduce_gather(table, target)
-    picture = reduced_picture(reduced, parameters(*values))
-    small = float(jnp.sum((picture - reduced.target) ** 2) + reduced.offset)
+    image = reduced_image(reduced, parameters(*values))
+    small = float(jnp.sum((image - reduced.target) ** 2) + reduced.offset)
     full = float(weighted_squared_error(gather_tabulated(table, parameters(*values)), target))
-    size = float(jnp.sum(picture**2) + jnp.sum(reduced.target**2))
+    size = float(jnp.sum(image**2) + jnp.sum(reduced.target**2))
     assert small == pytest.approx(full, abs=2e-6 * size)
 
 

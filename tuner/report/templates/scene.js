@@ -1,5 +1,5 @@
 "use strict";
-// Linear pictures under one exposure. Half floats → radiance or irradiance → tone curve → canvas, all here.
+// Linear images under one exposure. Half floats → radiance or irradiance → tone curve → canvas, all here.
 
 const VARIANTS = ["reference", "default", "tuned", "ceiling"];
 const LUMINANCE = [0.2126, 0.7152, 0.0722];
@@ -91,7 +91,7 @@ class View {
   paint(canvas, quantity, stops) {
     const exposure = this.linear.exposures[quantity] * 2 ** stops, shown = new Float64Array(3);
     const variant = canvas.dataset.variant;
-    const source = quantity === "picture" ? this.radiance[variant] : this.planes[`${variant}_indirect`];
+    const source = quantity === "image" ? this.radiance[variant] : this.planes[`${variant}_indirect`];
     const image = new ImageData(this.linear.width, this.linear.height);
     for (let i = 0, j = 0; i < source.length; i += 3, j += 4) {
       for (let c = 0; c < 3; c++) shown[c] = source[i + c] * exposure;
@@ -174,7 +174,7 @@ async function start() {
   await Promise.all(views.map((view) => view.load()));
   toolbar.hidden = false;
   views.forEach((view) => watch.observe(view.article));
-  // Paper shows every picture.
+  // Paper shows every image.
   addEventListener("beforeprint", () => draw(true));
   matchMedia("print").addEventListener("change", (change) => change.matches && draw(true));
   arrange();

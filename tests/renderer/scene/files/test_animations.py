@@ -44,7 +44,7 @@ def test_a_channel_moves_its_node_and_all_below(triangle):
 
 
 def test_the_scene_itself_stays_at_rest(triangle):
-    """A key at time 0 is no rest pose: still pictures keep what the nodes say."""
+    """A key at time 0 is no rest pose: still images keep what the nodes say."""
     triangle.node["translation"] = [7, 0, 0]
     animate(triangle, "translation", [0, 1], [[0, 0, 0], [4, 0, 0]])
     scene = read_scene(triangle.write())

@@ -83,7 +83,7 @@ BREAKS_GEOMETRY = {
     "UNRESOLVED_REFERENCE",
     "VALUE_NOT_IN_RANGE",
 }
-# Broken where a still, diffuse picture does not look: read, and rightly.
+# Broken where a still, diffuse image does not look: read, and rightly.
 READ_ALL_THE_SAME = {
     # A metallic factor that is a string.
     "assimp_gltf/test/models/glTF2/wrongTypes/badNumber.gltf",

@@ -210,7 +210,7 @@ def test_scenes_of_others_get_a_camera_that_sees_and_a_light_that_lights(scenes_
     light, _ = default_light(scene, camera)
     space = free_space(scene)
     sight = seen_by(space, camera)
-    # An object leaves background in the picture; a room next to none.
+    # An object leaves background in the image; a room next to none.
     assert sight.hit_fraction > (0.7 if is_room(space) else 0.12)
     assert 0.2 < lit_fraction(space, sight, (light,)) < 0.97
     assert light_hits(space, light).hit.mean() > 0.35

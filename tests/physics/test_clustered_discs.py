@@ -14,12 +14,12 @@ from vpltune.renderer.frame.passes.clustered_discs import LARGEST_COUNT
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.scene import Camera, Light, look_at, scaled
 from vpltune.renderer.scene.views import View, scaled_view
-from vpltune.tuner.fitting.fit_density import CELL_FOOTPRINT
+from vpltune.tuner.fitting.fit_density import DISC_FOOTPRINT
 
 
 def runtime_with(gl_context, scene=None, resolution=256, **parameters) -> Runtime:
-    relaxation = parameters.get("density_relaxation", 4)
-    form = {"density_relaxation": relaxation, "falloff_footprint": CELL_FOOTPRINT if relaxation else 0.5}
+    relaxation = parameters.get("lloyd_iterations", 4)
+    form = {"lloyd_iterations": relaxation, "falloff_footprint": DISC_FOOTPRINT if relaxation else 0.5}
     chosen = {**ArtistParameters().as_dict(), "vpl_count": 32, **form, **parameters}
     config = TunedConfig(ArtistParameters(**chosen), visibility="none")
     return Runtime(scene or colored_room(), config, rsm_resolution=resolution, context=gl_context)
@@ -33,7 +33,7 @@ def test_energy_is_kept(gl_context, light, vpl_count):
     With γ = 1, where every sample has the same share of it; to 0.1 %, what filtered colours leave to chance.
     """
     relaxed, points = (
-        runtime_with(gl_context, vpl_count=count, density_relaxation=relaxation).capture(
+        runtime_with(gl_context, vpl_count=count, lloyd_iterations=relaxation).capture(
             room_view(light, (8, 8))
         )
         for count, relaxation in ((vpl_count, 3), (4096, 0))
@@ -92,11 +92,11 @@ def test_a_cell_around_a_hole_stands_beside_it(gl_context):
 def test_less_error_than_points(gl_context, light):
     """Near a corner, against 16,384 points: at most two thirds of the squared error of as many points."""
     view = corner_view(light)
-    truth = runtime_with(gl_context, vpl_count=16384, density_relaxation=0).render(view, "irradiance")
+    truth = runtime_with(gl_context, vpl_count=16384, lloyd_iterations=0).render(view, "irradiance")
     error = {}
     for count in (32, 256):
         for relaxation in (0, 4):
-            runtime = runtime_with(gl_context, vpl_count=count, density_relaxation=relaxation)
+            runtime = runtime_with(gl_context, vpl_count=count, lloyd_iterations=relaxation)
             random = np.random.default_rng(5)
             frames = [runtime.capture(view, tuple(random.random(2))).indirect_irradiance for _ in range(6)]
             error[count, relaxation] = np.mean((np.array(frames) - truth) ** 2)
@@ -117,24 +117,24 @@ def test_more_cells_keep_the_mean(gl_context, light):
 
 @pytest.mark.parametrize("factor", [0.01, 100.0])
 def test_cells_have_no_unit(gl_context, factor):
-    """Scene, camera and light scaled together: the same picture, to 1e-3 relative RMSE."""
+    """Scene, camera and light scaled together: the same image, to 1e-3 relative RMSE."""
     view = room_view("spot", (32, 24))
-    picture = runtime_with(gl_context).render_radiance(view)
+    image = runtime_with(gl_context).render_radiance(view)
     grown = runtime_with(gl_context, scaled(colored_room(), factor)).render_radiance(
         scaled_view(view, factor)
     )
-    assert np.sqrt(np.mean((grown - picture) ** 2) / np.mean(picture**2)) < 1e-3
+    assert np.sqrt(np.mean((grown - image) ** 2) / np.mean(image**2)) < 1e-3
 
 
 def test_discs_have_no_near_field(gl_context):
     """They withhold nothing that it could give back."""
-    pictures = [
+    images = [
         runtime_with(gl_context, screen_space_strength=strength).render(
             room_view("spot", (32, 24)), "irradiance"
         )
         for strength in (0.0, 2.0)
     ]
-    np.testing.assert_array_equal(*pictures)
+    np.testing.assert_array_equal(*images)
 
 
 def test_dark_and_very_many(gl_context):
@@ -142,7 +142,7 @@ def test_dark_and_very_many(gl_context):
     dark = runtime_with(gl_context).capture(room_view(None, (16, 12)))
     assert not dark.indirect_irradiance.any() and np.isfinite(dark.vpl_position_world).all()
     many = [
-        runtime_with(gl_context, vpl_count=LARGEST_COUNT + 1, density_relaxation=relaxation)
+        runtime_with(gl_context, vpl_count=LARGEST_COUNT + 1, lloyd_iterations=relaxation)
         .capture(room_view("spot", (8, 8)))
         .vpl_position_world
         for relaxation in (0, 4)
@@ -154,15 +154,15 @@ def test_cells_steady_a_swept_light(gl_context):
     """Under a light that creeps, irradiance from cells jumps no more from frame to frame than from points."""
     changes = {}
     for relaxation in (0, 4):
-        runtime = runtime_with(gl_context, vpl_count=64, density_relaxation=relaxation)
-        pictures = []
+        runtime = runtime_with(gl_context, vpl_count=64, lloyd_iterations=relaxation)
+        images = []
         for step in range(16):
             place = np.array([0.1 + 0.004 * step, 0.9, 0.05])
             light = Light("spot", np.full(3, 4.0), place, np.array([0.0, -1.0, 0.0]), 0.3, 0.85)
             camera = room_view("spot").camera
-            pictures.append(
+            images.append(
                 runtime.render(View("s", "fitted", (32, 24), camera, (light,)), "irradiance").copy()
             )
-        second = np.diff(np.array(pictures, np.float64), n=2, axis=0)
-        changes[relaxation] = np.abs(second).mean() / np.mean(pictures)
+        second = np.diff(np.array(images, np.float64), n=2, axis=0)
+        changes[relaxation] = np.abs(second).mean() / np.mean(images)
     assert changes[4] < changes[0], changes

@@ -1,0 +1,47 @@
+"""Brings configs of version 1 forward to version 2.
+
+Version 1 is what VPLtune 0.1 wrote. It is read until VPLtune 1.0, and never written.
+"""
+
+from typing import Any
+
+from vpltune.renderer.errors import InputError
+
+OLDER_NAMES = {
+    "falloff_transmittance": "extinction_coefficient",
+    "density_relaxation": "lloyd_iterations",
+}
+"""Parameters that version 1 called otherwise, to their names of today."""
+
+
+_KEYS = ("format", "version", "visibility", "parameters", "auto", "provenance")
+
+
+def brought_forward(document: dict[str, Any], where: str) -> dict[str, Any]:
+    """A document of version 1 as version 2 has it; its values are not checked here.
+
+    The visibility mode "none" is κ = 0. The fit's status stood in `provenance`.
+
+    Raises:
+        InputError: an unknown key, or a parameter is missing that version 1 called otherwise.
+    """
+    for key in document:
+        if key not in _KEYS:
+            raise InputError(f"{where}: unknown key {key!r:.60}; version 1 knows {', '.join(_KEYS)}")
+    forward = {**document, "version": 2}
+    parameters = document.get("parameters")
+    if isinstance(parameters, dict):
+        for older in OLDER_NAMES:
+            if older not in parameters:
+                raise InputError(f"{where}: parameters: key '{older}' is missing")
+        forward["parameters"] = {OLDER_NAMES.get(key, key): value for key, value in parameters.items()}
+        iterations = forward["parameters"].pop("lloyd_iterations")
+        forward["quality"] = {"lloyd_iterations": iterations}
+        if document.get("visibility") == "none":
+            forward["visibility"] = "transmittance"
+            forward["parameters"]["extinction_coefficient"] = 0.0
+    provenance = document.get("provenance")
+    if isinstance(provenance, dict) and "status" in provenance:
+        forward["provenance"] = {key: v for key, v in provenance.items() if key not in ("status", "fit")}
+        forward["fit"] = {"status": provenance["status"], "sentence": provenance.get("fit", "")}
+    return forward

@@ -1,0 +1,195 @@
+"""The quality part of a config: settings that trade image quality for frame time.
+
+`vpltune fit --budget-ms` finds them, and every command draws with them unless a flag overrides one.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from vpltune.renderer.errors import InputError
+
+INTERLEAVES = (1, 2, 4, 8)
+MAP_REFINEMENTS = (1, 2, 4, 8)
+SMALLEST_MAP, LARGEST_MAP = 4, 64
+SMALLEST_RSM, LARGEST_RSM = 64, 8192
+LONGEST_ADAPTATION = 1e4
+"""Frames: nearly three minutes at 60 frames per second, far beyond any use."""
+LARGEST_SIDE = 16384
+"""Pixels along the side of a frame; also the rule of `views.json`."""
+
+
+@dataclass(frozen=True)
+class FrameBudget:
+    """The frame-time budget that the settings were chosen for, and where they were measured to meet it."""
+
+    milliseconds: float
+    frame_size: tuple[int, int]
+    """Width and height of the timed frames, in pixels."""
+    machine: str
+    """The OpenGL renderer's name."""
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How much work a frame does.
+
+    Raises:
+        InputError: a field is out of range.
+    """
+
+    interleave: int = 1
+    """One of `INTERLEAVES`: the VPLs are shared out among the pixels of a block of this side, and a filter
+    joins them. 1 gathers every VPL at every pixel, as the tuner's surrogate does. With fewer VPLs than pixels
+    in a block, blocks are smaller."""
+
+    map_size: int = 24
+    """Texels along the side of a VPL's visibility map, in [4, 64]."""
+
+    map_refinement: int = 4
+    """One of `MAP_REFINEMENTS`: rays along the side of a map texel that a silhouette crosses."""
+
+    rsm_resolution: int | None = None
+    """Texels along the side of an RSM face, in [64, 8192]; None picks 1,024, or 512 with more than two faces
+    (a point light has six)."""
+
+    adaptation_frames: float = 15.0
+    """Time constant, in frames, at which a clip's parameters follow the prior of an `auto` config: a quarter
+    of a second at 60 frames per second. 0 follows at once. A still always does."""
+
+    budget: FrameBudget | None = None
+
+    def __post_init__(self) -> None:
+        self.check("quality")
+
+    def check(self, where: str) -> None:
+        """Raise InputError, naming `where`, if a field is out of range."""
+        _one_of(self.interleave, INTERLEAVES, f"{where}.interleave")
+        _whole(self.map_size, SMALLEST_MAP, LARGEST_MAP, f"{where}.map_size")
+        _one_of(self.map_refinement, MAP_REFINEMENTS, f"{where}.map_refinement")
+        if self.rsm_resolution is not None:
+            _whole(self.rsm_resolution, SMALLEST_RSM, LARGEST_RSM, f"{where}.rsm_resolution")
+        _number(self.adaptation_frames, 0.0, LONGEST_ADAPTATION, f"{where}.adaptation_frames")
+
+    def interleave_for(self, vpl_count: int) -> int:
+        """The side of a block: `interleave`, or less where a block would have more pixels than VPLs.
+
+        A pixel without a VPL of its own stays dark, and at the image's border a window of such pixels passes
+        for unlit: one VPL shared among 64 pixels lost a tenth of its light.
+        """
+        return max(side for side in INTERLEAVES if side <= self.interleave and side**2 <= max(1, vpl_count))
+
+    def as_dict(self) -> dict[str, Any]:
+        """The part as the file holds it; what is None is left out."""
+        members = {name: value for name, value in asdict(self).items() if value is not None}
+        if self.budget is not None:
+            members["budget"]["frame_size"] = list(self.budget.frame_size)
+        return members
+
+    @classmethod
+    def validated(cls, values: Any, where: str) -> "Quality":
+        """The part from a file's content; keys that are absent have their defaults.
+
+        Raises:
+            InputError: not an object, an unknown key, or a value out of range.
+        """
+        members = _members(values, tuple(cls.__dataclass_fields__), where)
+        if "budget" in members:
+            members["budget"] = _budget(members["budget"], f"{where}.budget")
+        # Checked before the object exists, so that the error names the file.
+        unchecked = object.__new__(cls)
+        for name, spec in cls.__dataclass_fields__.items():
+            object.__setattr__(unchecked, name, members.get(name, spec.default))
+        unchecked.check(where)
+        return cls(**members)
+
+
+def quality_schema(lloyd_iterations: dict[str, Any]) -> dict[str, Any]:
+    """JSON Schema of the key `quality`; `lloyd_iterations` is that member's own schema."""
+    side = {"type": "integer", "minimum": 1, "maximum": LARGEST_SIDE}
+    default = Quality()
+    return {
+        "description": "Settings that trade image quality for frame time.",
+        "type": "object",
+        "additionalProperties": False,
+        "properties": {
+            "interleave": {"enum": list(INTERLEAVES), "default": default.interleave},
+            "map_size": {
+                "type": "integer",
+                "minimum": SMALLEST_MAP,
+                "maximum": LARGEST_MAP,
+                "default": default.map_size,
+            },
+            "map_refinement": {"enum": list(MAP_REFINEMENTS), "default": default.map_refinement},
+            "rsm_resolution": {"type": "integer", "minimum": SMALLEST_RSM, "maximum": LARGEST_RSM},
+            "lloyd_iterations": lloyd_iterations,
+            "adaptation_frames": {
+                "type": "number",
+                "minimum": 0.0,
+                "maximum": LONGEST_ADAPTATION,
+                "not": {"exclusiveMaximum": 0.0},
+                "default": default.adaptation_frames,
+            },
+            "budget": {
+                "description": "The frame-time budget that was met, at which frame size and on what machine.",
+                "type": "object",
+                "required": ["milliseconds", "frame_size", "machine"],
+                "additionalProperties": False,
+                "properties": {
+                    "milliseconds": {
+                        "type": "number",
+                        "exclusiveMinimum": 0.0,
+                        "maximum": 1e9,
+                        "not": {"maximum": 0.0},
+                    },
+                    "frame_size": {"type": "array", "items": side, "minItems": 2, "maxItems": 2},
+                    "machine": {"type": "string"},
+                },
+            },
+        },
+    }
+
+
+def _budget(values: Any, where: str) -> FrameBudget:
+    names = ("milliseconds", "frame_size", "machine")
+    members = _members(values, names, where)
+    for name in names:
+        if name not in members:
+            raise InputError(f"{where}: key '{name}' is missing")
+    milliseconds, size, machine = (members[name] for name in names)
+    _number(milliseconds, 0.0, 1e9, f"{where}.milliseconds")
+    if not milliseconds > 0.0:
+        raise InputError(f"{where}.milliseconds: must be positive, got {milliseconds!r}")
+    if not isinstance(size, list) or len(size) != 2:
+        raise InputError(f"{where}.frame_size: must be [width, height], got {size!r:.60}")
+    for side in size:
+        _whole(side, 1, LARGEST_SIDE, f"{where}.frame_size")
+    if not isinstance(machine, str):
+        raise InputError(f"{where}.machine: must be a string, got {machine!r:.60}")
+    return FrameBudget(float(milliseconds), (size[0], size[1]), machine)
+
+
+def _members(values: Any, known: tuple[str, ...], where: str) -> dict[str, Any]:
+    if not isinstance(values, Mapping):
+        raise InputError(f"{where}: must be an object, got {type(values).__name__}")
+    for key in values:
+        if key not in known:
+            raise InputError(f"{where}: unknown key {key!r:.60}; known are {', '.join(known)}")
+    return dict(values)
+
+
+def _one_of(value: Any, allowed: tuple[int, ...], where: str) -> None:
+    if isinstance(value, bool) or not isinstance(value, int) or value not in allowed:
+        raise InputError(f"{where}: must be one of {', '.join(map(str, allowed))}, got {value!r:.60}")
+
+
+def _whole(value: Any, low: int, high: int, where: str) -> None:
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise InputError(f"{where}: must be a whole number from {low} to {high}, got {value!r:.60}")
+
+
+def _number(value: Any, low: float, high: float, where: str) -> None:
+    number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    if not number or not low <= value <= high:
+        raise InputError(f"{where}: must be a number from {low:g} to {high:g}, got {value!r:.60}")

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from vpltune.renderer.frame.runtime_options import RuntimeOptions
+from vpltune.renderer.config.tuned_config import TunedConfig
 
 TEXEL_BYTES = 8
 """A distance and a packed normal, or the place of finer texels: shaders/common/vpl_visibility.glsl."""
@@ -32,9 +32,11 @@ class VisibilityMapLayout:
     refinement: int
 
     @classmethod
-    def of(cls, options: RuntimeOptions) -> "VisibilityMapLayout":
-        """That of a runtime whose config asks for maps."""
-        return cls(options.visibility_map_size, options.visibility_map_refinement)
+    def of(cls, config: TunedConfig) -> "VisibilityMapLayout":
+        """The layout that a config asks for."""
+        if config.visibility != "maps":
+            return NO_MAPS
+        return cls(config.quality.map_size, config.quality.map_refinement)
 
     @property
     def defines(self) -> dict[str, int | float]:
@@ -56,3 +58,5 @@ class VisibilityMapLayout:
 
 
 NO_MAPS = VisibilityMapLayout(0, 1)
+MAP_READS = ("visibility_maps", "visibility_details")
+"""What a program declares that includes `common/vpl_visibility.glsl`."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float32
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import CapturedFrame
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.views import View
@@ -32,8 +32,8 @@ class CapturedView:
     view: View
     reference: ReferenceView
     captured: CapturedFrame
-    drawn_with: ArtistParameters | None = None
-    """The parameters that `captured` was drawn with, where they are known."""
+    drawn_with: TunedConfig | None = None
+    """The config that `captured` was drawn with, where it is known; a prior's parameters as it set them."""
     statistics: Float32[np.ndarray, " statistics"] | None = None
     """What `renderer.config.scene_statistics` measures of it, where that was asked for."""
     valid: Bool[np.ndarray, "height width"] = field(init=False)
@@ -105,30 +105,32 @@ class CapturedView:
 
 def capture_views(
     runtime: Runtime,
+    config: TunedConfig,
     views: tuple[View, ...],
     references: tuple[ReferenceView, ...],
     *,
     statistics: bool = False,
 ) -> tuple[CapturedView, ...]:
-    """Draw and read back every view; `statistics` measures those of its scene too."""
+    """Draw and read back every view with `config`; `statistics` measures those of its scene too."""
     captured = []
     for view, reference in zip(views, references, strict=True):
-        frame = runtime.capture(view)
-        measured = runtime.scene_statistics(view) if statistics else None
-        captured.append(CapturedView(view, reference, frame, runtime.drawn_parameters(), measured))
+        drawn = runtime.draw(view, config)
+        frame = drawn.capture()
+        measured = drawn.read_statistics() if statistics else None
+        drawn_with = config.with_parameters(drawn.read_parameters())
+        captured.append(CapturedView(view, reference, frame, drawn_with, measured))
     return tuple(captured)
 
 
 def runtime_irradiance(
     runtime: Runtime,
-    parameters: ArtistParameters,
+    config: TunedConfig,
     view: CapturedView,
     known: Sequence[CapturedView] = (),
 ) -> Float32[np.ndarray, "height width 3"]:
-    """The runtime's own indirect irradiance of a view with `parameters`, drawn unless it is in `known` or
-    `view`."""
+    """The runtime's own indirect irradiance [W/m²] of a view with `config`, drawn unless `known` or `view`
+    holds it."""
     for each in (view, *known):
-        if each.drawn_with == parameters and each.view is view.view:
+        if each.drawn_with is not None and each.drawn_with.draws_as(config) and each.view is view.view:
             return each.captured.indirect_irradiance
-    runtime.parameters = parameters
-    return runtime.render(view.view, "irradiance")
+    return runtime.render(view.view, config, layer="irradiance")

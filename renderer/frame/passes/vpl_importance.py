@@ -1,18 +1,16 @@
 """VPL importance: which light of the RSM the camera would miss most, as a factor of the chance to draw it."""
 
-import moderngl
-
+from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
 from vpltune.renderer.frame.point_table import R2_STEPS
-from vpltune.renderer.gpu import buffer_bindings
-from vpltune.renderer.gpu.camera_uniforms import CameraUniforms
-from vpltune.renderer.gpu.render_targets import GBuffer, ReflectiveShadowMap
-from vpltune.renderer.gpu.shader_library import load_compute, set_uniforms
+from vpltune.renderer.frame.rsm_resolution import FEW_FACES
+from vpltune.renderer.gpu.gpu_program import ComputeProgram
+from vpltune.renderer.gpu.render_targets import GBUFFER_READS, RSM_READS, ReflectiveShadowMap
+from vpltune.renderer.gpu.resources import Resources
 
 CELLS = 64
 """Along the side of an RSM face, each with one importance."""
 CELLS_OF_MANY = 32
 """The same where there are more than `FEW_FACES`: a point light has six."""
-FEW_FACES = 2
 RECEIVERS = 128
 """Surface points that stand for the image."""
 SPREAD = 16.0
@@ -41,59 +39,45 @@ def importance_cells(face_count: int) -> int:
     return CELLS if face_count <= FEW_FACES else CELLS_OF_MANY
 
 
-class VplImportancePass:
+class VplImportancePass(FramePass):
     """G-buffer, RSM → a factor of the sampling weight for every cell of the RSM.
 
     Placing VPLs by what the camera sees is Segovia et al. 2006 ("Bidirectional instant radiosity"); here the
     chances are those of least variance, from points spread over the image and without visibility.
     """
 
-    def __init__(self, context: moderngl.Context, rsm: ReflectiveShadowMap):
-        self._context = context
+    name = "vpl_importance"
+
+    def __init__(self, resources: Resources, rsm: ReflectiveShadowMap):
+        self._rsm = rsm
         cells = importance_cells(rsm.face_count)
         self._cell_count = rsm.face_count * cells**2
-        defines = {
-            **buffer_bindings.DEFINES,
-            **DEFINES,
-            "RSM_RESOLUTION": rsm.resolution,
-            "IMPORTANCE_CELLS": cells,
-        }
-        self._cells = load_compute(context, "vpl_importance/vpl_importance_cells", defines)
-        self._receivers = load_compute(context, "vpl_importance/vpl_importance_receivers", defines)
-        self._importance = load_compute(context, "vpl_importance/vpl_importance", defines)
-        self._factor = load_compute(context, "vpl_importance/vpl_importance_factor", defines)
-        count = max(1, self._cell_count)
-        self._buffers = {
-            buffer_bindings.IMPORTANCE_CELLS: context.buffer(reserve=count * _CELL_BYTES),
-            buffer_bindings.IMPORTANCE_RECEIVERS: context.buffer(reserve=RECEIVERS * _RECEIVER_BYTES),
-        }
-        self.factor = context.buffer(reserve=count * 4)
+        context, count = resources.context, max(1, self._cell_count)
+        resources["importance_cells"] = context.buffer(reserve=count * _CELL_BYTES)
+        resources["importance_receivers"] = context.buffer(reserve=RECEIVERS * _RECEIVER_BYTES)
+        resources["vpl_importance"] = context.buffer(reserve=count * 4)
+        defines = {**DEFINES, "RSM_RESOLUTION": rsm.resolution, "IMPORTANCE_CELLS": cells}
 
-    def draw(
-        self,
-        camera: CameraUniforms,
-        gbuffer: GBuffer,
-        rsm: ReflectiveShadowMap,
-    ) -> None:
-        """Measure the importance of the light in `rsm`, to the power of the η that is bound."""
-        for binding, buffer in self._buffers.items():
-            buffer.bind_to_storage_buffer(binding)
-        self.bind()
+        def program(stage: str, reads: tuple[str, ...], writes: str) -> ComputeProgram:
+            return ComputeProgram(
+                resources, f"vpl_importance/vpl_importance{stage}", defines, reads=reads, writes=(writes,)
+            )
+
+        measured = ("importance_cells", "importance_receivers")
+        self._cells = program("_cells", (*RSM_READS, "importance_receivers"), "importance_cells")
+        self._receivers = program("_receivers", (*GBUFFER_READS, "importance_cells"), "importance_receivers")
+        self._importance = program("", ("artist_parameters", *RSM_READS, *measured), "vpl_importance")
+        self._factor = program("_factor", ("artist_parameters", *RSM_READS), "vpl_importance")
+
+    def wanted(self, inputs: FrameInputs) -> bool:
+        """Where the density heeds it."""
+        return inputs.parameters.density_importance > 0.0
+
+    def draw(self, inputs: FrameInputs) -> None:
+        """Measure the importance of the light in the RSM, to the power of η."""
+        uniforms = {**inputs.camera.uniforms, **self._rsm.uniforms, "cell_count": self._cell_count}
         groups = -(-self._cell_count // 64)
-        rsm.bind(self._cells, 0)
-        self._run(self._cells, groups)
-        camera.bind_gbuffer(self._receivers, gbuffer, 0)
-        set_uniforms(self._receivers, cell_count=self._cell_count)
-        self._run(self._receivers, RECEIVERS)
-        set_uniforms(self._importance, cell_count=self._cell_count)
-        self._run(self._importance, groups)
-        set_uniforms(self._factor, cell_count=self._cell_count)
-        self._run(self._factor, 1)
-
-    def bind(self) -> None:
-        """Bind what VPL placement reads."""
-        self.factor.bind_to_storage_buffer(buffer_bindings.VPL_IMPORTANCE)
-
-    def _run(self, program: moderngl.ComputeShader, groups: int) -> None:
-        program.run(groups)
-        self._context.memory_barrier(self._context.SHADER_STORAGE_BARRIER_BIT)
+        self._cells.dispatch(groups, **uniforms)
+        self._receivers.dispatch(RECEIVERS, **uniforms)
+        self._importance.dispatch(groups, **uniforms)
+        self._factor.dispatch(1, **uniforms)

@@ -30,7 +30,6 @@ from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.fitting.fit_placement import fit_placement
 from vpltune.tuner.fitting.fit_status import Descent
 from vpltune.tuner.fitting.fit_views import robust_errors
-from vpltune.tuner.fitting.search_space import held_for
 from vpltune.tuner.metrics.relative_squared_error import target_of, weighted_squared_error
 from vpltune.tuner.metrics.robust_error import RobustError
 from vpltune.tuner.surrogate.captured_view import CapturedView
@@ -146,7 +145,6 @@ def fit_density(
     chosen = table_rotations(ROTATIONS, seed) if rotations is None else tuple(rotations)
     fits: dict[Density, tuple[ArtistParameters, Descent]] = {}
     config, start = config.with_full_gather(), config.parameters
-    held = held_for(config.visibility)
     errors: tuple[RobustError, ...] | None = None
 
     def best() -> Density:
@@ -160,7 +158,7 @@ def fit_density(
             if robust and errors is None:
                 # The start's own density comes first: its errors set the scale for all.
                 errors = robust_errors(drawn, seed=seed)
-            fit = fit_placement(drawn, parameters, errors, seed=seed, held=held)
+            fit = fit_placement(drawn, parameters, errors, seed=seed)
             fits[density] = fit.parameters, fit.descent
             if progress is not None:
                 progress(min(len(fits) / _TRIALS, 0.99))

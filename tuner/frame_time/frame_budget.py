@@ -28,7 +28,6 @@ from vpltune.tuner.fitting.fit_density import (
 from vpltune.tuner.fitting.fit_placement import fit_placement
 from vpltune.tuner.fitting.fit_status import Descent
 from vpltune.tuner.fitting.fit_views import robust_errors
-from vpltune.tuner.fitting.search_space import held_for
 from vpltune.tuner.frame_time.cost_model import (
     COUNTS,
     INTERLEAVES,
@@ -298,8 +297,7 @@ class FrameBudget:
         config = self._config(choice, parameters).with_full_gather()
         captured = rotated_views(self._runtime, self._views, config, rotations)
         errors = robust_errors(captured, seed=self._seed)
-        held = held_for(self._start.visibility)
-        return fit_placement(captured, parameters, errors, seed=self._seed, held=held).parameters
+        return fit_placement(captured, parameters, errors, seed=self._seed).parameters
 
     def _config(self, choice: Quality, parameters: ArtistParameters) -> TunedConfig:
         return replace(self._start, parameters=parameters, quality=choice, auto=None)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec, placement
-from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS, place_of, value_at
+from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS
 from vpltune.renderer.config.tuned_config import FitNote, TunedConfig, read_config, write_config
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
@@ -375,7 +375,7 @@ def _mean_parameters(rest: ArtistParameters, drawn: Sequence[ArtistParameters]) 
     values = {}
     for name in AUTO_PARAMETERS:
         spec = parameter_spec(name)
-        values[name] = value_at(spec, fmean(place_of(spec, getattr(each, name)) for each in drawn))
+        values[name] = spec.within(fmean(spec.place_of(getattr(each, name)) for each in drawn))
     return replace(rest, **values)
 
 

@@ -14,7 +14,7 @@ from vpltune.tuner.fitting.fit_density import density_document, fit_density, wit
 from vpltune.tuner.fitting.fit_placement import fit_placement, ready_views
 from vpltune.tuner.fitting.fit_status import Descent
 from vpltune.tuner.fitting.fit_views import robust_errors
-from vpltune.tuner.fitting.search_space import SearchSpace, held_for
+from vpltune.tuner.fitting.search_space import SearchSpace
 from vpltune.tuner.fitting.uncertainty import Interval, fit_with_intervals, open_intervals
 from vpltune.tuner.frame_time.fit_budget import BudgetOptions, fit_to_budget
 from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
@@ -75,13 +75,11 @@ def search(
         seed=seed,
         progress=lambda share: progress(0.6 * share),
     )
-    held = held_for(start.visibility)
     fit = fit_placement(
         placed.views,
         placed.parameters,
         errors,
         seed=seed,
-        held=held,
         progress=lambda share: progress(0.6 + 0.3 * share),
     )
     prior = replace(
@@ -89,7 +87,7 @@ def search(
         visibility_bias=fit.parameters.visibility_bias,
         visibility_softness=fit.parameters.visibility_softness,
     )
-    tuned, _, known = fit_with_intervals(fit.views, prior, held=held)
+    tuned, _, known = fit_with_intervals(fit.views, prior)
     progress(1.0)
     return Search(
         placed.parameters,
@@ -131,6 +129,6 @@ def _recaptured(
         return Search(base, tuned, start.quality, descent, {}, captured, found)
     # One rotation a view: several of one view err together, and would count as independent witnesses.
     ready = ready_views(captured, tuned, robust_errors(captured, seed=seed), seed=seed)
-    names = frozenset(SearchSpace().names) - held_for(start.visibility)
+    names = frozenset(SearchSpace().names)
     known = open_intervals(ready, tuned, names, base)
     return Search(base, tuned, start.quality, descent, known, captured, found)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Bool, Float32
+from jaxtyping import Bool, Float32, Int
 
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import CapturedFrame
@@ -73,6 +73,20 @@ class CapturedView:
             return usable
         return np.sort(np.random.default_rng(seed).choice(usable, count, replace=False))
 
+    def pixel_values(self, limit: int, seed: int) -> "PixelValues":
+        """What is known at the pixels of `fitted_pixels`."""
+        chosen = self.fitted_pixels(limit, seed)
+        flat = np.flatnonzero(self.captured.valid.ravel())[chosen]
+        reference = self.reference
+        images = (
+            reference.irradiance,
+            reference.direct_irradiance,
+            self.captured.indirect_irradiance,
+            reference.irradiance_a,
+            reference.irradiance_b,
+        )
+        return PixelValues(chosen, flat, *(image.reshape(-1, 3)[flat] for image in images))
+
     def reference_radiance(self) -> Float32[np.ndarray, "height width 3"]:
         """Direct plus indirect radiance of the reference, W/(m² sr)."""
         reference = self.reference
@@ -101,6 +115,25 @@ class CapturedView:
             light * same,
             self.valid,
         )
+
+
+@dataclass(frozen=True, eq=False)
+class PixelValues:
+    """Irradiance [W/m²] at some pixels of a view: the reference's and the runtime's."""
+
+    chosen: Int[np.ndarray, " pixels"]
+    """Indices into the captured frame's valid pixels."""
+    flat: Int[np.ndarray, " pixels"]
+    """Indices into the image, row by row."""
+    reference: Float32[np.ndarray, "pixels 3"]
+    """Indirect irradiance of the reference."""
+    direct: Float32[np.ndarray, "pixels 3"]
+    """Direct irradiance of the reference."""
+    drawn: Float32[np.ndarray, "pixels 3"]
+    """Indirect irradiance of the image that the view was captured with."""
+    half_a: Float32[np.ndarray, "pixels 3"]
+    half_b: Float32[np.ndarray, "pixels 3"]
+    """The reference's two independent halves."""
 
 
 def capture_views(

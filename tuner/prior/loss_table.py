@@ -110,7 +110,36 @@ def _sums(
 
 def table_loss(table: LossTable, point: Float[Array | np.ndarray, " parameters"]) -> Float[Array, ""]:
     """The loss of one view at a point between `LOWEST_POINT` and `HIGHEST_POINT`; differentiable."""
-    point = jnp.asarray(point)
+    square, product = _interpolated(table, jnp.asarray(point))
+    intensity = _INTENSITY_SPEC.value_at(jnp.asarray(point)[0])
+    return intensity**2 * square - intensity * product + table.constant
+
+
+def table_residuals(
+    table: LossTable, point: Float[Array | np.ndarray, " parameters"]
+) -> Float[Array, "residuals"]:
+    """Two numbers whose squares sum to `table_loss`, or to 0 where that is negative; differentiable.
+
+    A k² − B k + C = (√A k − B/(2√A))² + (C − B²/(4A)). The second term is the loss at the best intensity. It
+    falls below zero only by the noise of the reference's halves.
+    """
+    square, product = _interpolated(table, jnp.asarray(point))
+    intensity = _INTENSITY_SPEC.value_at(jnp.asarray(point)[0])
+    # 1e-30: where no light arrives the table is zero, and so are both residuals.
+    root = jnp.sqrt(jnp.maximum(square, 1e-30))
+    least = table.constant - (product / (2.0 * root)) ** 2
+    # Below the noise the root has no slope, which keeps its gradient finite.
+    seen = least > 0.0
+    return jnp.stack(
+        [
+            root * intensity - product / (2.0 * root),
+            jnp.where(seen, jnp.sqrt(jnp.where(seen, least, 1.0)), 0.0),
+        ]
+    )
+
+
+def _interpolated(table: LossTable, point: Array) -> tuple[Array, Array]:
+    """A and B at a point."""
     starts, weights = zip(
         _cubic(point[1], FOOTPRINT_PLACES),
         _linear(point[2], BIAS_PLACES),
@@ -118,14 +147,11 @@ def table_loss(table: LossTable, point: Float[Array | np.ndarray, " parameters"]
         strict=True,
     )
 
-    def interpolated(values: Array) -> Array:
+    def at(values: Array) -> Array:
         near = jax.lax.dynamic_slice(values, starts, (4, 2, 2))
         return jnp.einsum("abc,a,b,c->", near, *weights, precision=jax.lax.Precision.HIGHEST)
 
-    intensity = _INTENSITY_SPEC.value_at(point[0])
-    return (
-        intensity**2 * interpolated(table.square) - intensity * interpolated(table.product) + table.constant
-    )
+    return at(table.square), at(table.product)
 
 
 def default_point(parameters: ArtistParameters) -> Float32[np.ndarray, " parameters"]:

@@ -11,9 +11,13 @@ from typing import Any
 from vpltune.renderer.errors import InputError
 
 INTERLEAVES = (1, 2, 4, 8)
+"""Sides of a block. A choice: 8² pixels are one workgroup of the gather."""
 MAP_REFINEMENTS = (1, 2, 4, 8)
+"""Rays along the side of a refined texel. A choice."""
 SMALLEST_MAP, LARGEST_MAP = 4, 64
+"""Texels along the side of a map. The largest map fills the 32 KiB of shared memory that every driver has."""
 SMALLEST_RSM, LARGEST_RSM = 64, 8192
+"""Texels along the side of a face. A choice: six faces of the largest need 2 GiB."""
 LONGEST_ADAPTATION = 1e4
 """Frames: nearly three minutes at 60 frames per second, far beyond any use."""
 LARGEST_SIDE = 16384

@@ -37,6 +37,7 @@ from vpltune.renderer.files.strict_json import DuplicateKeyError, unique_keys
 
 FORMAT = "vpltune"
 VERSION = 2
+"""Version that is written; version 1 is read too."""
 DEFAULT_CONFIG_NAME = "default"
 AUTO_CONFIG_NAME = "auto"
 PRESETS = (DEFAULT_CONFIG_NAME, AUTO_CONFIG_NAME)

@@ -329,7 +329,7 @@ def test_the_unit_follows_the_lights_not_their_scale():
     ("field", "value", "message"),
     [
         ("range", 0.0, "every range must be positive, got 0.0"),
-        ("intensity", -1.0, "no intensity may be negative, got -1.0"),
+        ("intensity", -1.0, "every intensity must be ≥ 0, got -1.0"),
         ("position_world", np.nan, "every number must be finite"),
     ],
 )
@@ -343,7 +343,7 @@ def test_lights_that_cannot_be_are_refused(field, value, message):
 def test_records_of_another_kind_are_refused():
     with pytest.raises(ValueError, match="must be .n. of DYNAMIC_LIGHT_DTYPE, got .3, 12. float32"):
         DynamicLights(np.zeros((3, 12), np.float32))
-    with pytest.raises(ValueError, match="0 ≤ inner < outer ≤ π/2 must hold, got 0.5 and 0.4"):
+    with pytest.raises(ValueError, match="cone angles must satisfy 0 ≤ inner < outer ≤ π/2, got 0.5 and 0.4"):
         spot((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0, 0.5, 0.4)
 
 

@@ -278,20 +278,20 @@ REFUSED = {
     ),
     "not XML": ("<scene version='3.0.0'>", "not XML"),
     "empty": (" ", "not XML"),
-    "not a scene": ("<svg/>", "line 1: <svg>: a Mitsuba scene's outermost element is <scene>"),
+    "not a scene": ("<svg/>", "line 1: <svg>: the root element of a Mitsuba scene must be <scene>"),
     "deep": ("<scene>" + '<bsdf type="twosided">' * 100, "at most 64 deep"),
     "no shapes": ('<scene version="3.0.0"/>', "the scene has no triangles"),
     "shape": (
         '<scene><shape type="hair"/></scene>',
-        "line 1: shape 'hair': shapes of this type are not read",
+        "line 1: shape 'hair': unsupported shape type; must be one of obj, ply",
     ),
     "material": ('<scene><shape type="cube"><bsdf type="velvet"/></shape></scene>', "bsdf 'velvet'"),
     "emitter": ('<scene><shape type="cube"/><emitter type="sunsky"/></scene>', "emitter 'sunsky'"),
-    "element": ('<scene><shape type="cube"><wheel name="a"/></shape></scene>', "<wheel>: such an element"),
+    "element": ('<scene><shape type="cube"><wheel name="a"/></shape></scene>', "<wheel>: unknown element"),
     "no type": ("<scene><shape/></scene>", "attribute 'type' is missing"),
     "file": (
         '<scene><shape type="obj"><string name="filename" value="a.obj"/></shape></scene>',
-        "'a.obj' is not there",
+        "'a.obj' does not exist",
     ),
     "file outside": (
         '<scene><shape type="obj"><string name="filename" value="../a.obj"/></shape></scene>',
@@ -324,7 +324,7 @@ REFUSED = {
     ),
     "reference": (
         '<scene><shape type="cube"><ref id="m"/></shape></scene>',
-        "nothing before it has the id 'm'",
+        "no object with the id 'm' is defined before it",
     ),
     "negative": (
         '<scene><shape type="cube"><bsdf type="diffuse"><rgb name="reflectance" value="-1"/>'

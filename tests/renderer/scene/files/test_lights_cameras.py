@@ -75,7 +75,9 @@ def test_lights_out_of_range_are_refused(triangle, change, message):
 
 def test_range_is_left_aside_aloud(triangle):
     path = with_light(triangle, {"type": "point", "range": 5})
-    assert read_scene(path).warnings == ("a light's range is ignored: light falls off as 1/d² without end",)
+    assert read_scene(path).warnings == (
+        "a light's range is ignored: light falls off as 1/d² at any distance",
+    )
 
 
 def test_a_light_that_is_not_there_is_refused(triangle):

@@ -127,7 +127,7 @@ def test_a_strip_by_its_edges():
     # Edges, newest first, after (0, 1, 2): (0, 2), (2, 1), (1, 0). One more on (a, b) leaves (a, c), (c, b).
     expected = [(0, 1, 2), (0, 2, 3), (3, 2, 4), (3, 4, 1), (3, 1, 9), (3, 9, 10), (0, 1, 2)]
     np.testing.assert_array_equal(decode_triangles(stream, 21, "here").reshape(-1, 3), expected)
-    with pytest.raises(SceneFileError, match="does not end with its triangles"):
+    with pytest.raises(SceneFileError, match="must end after its last triangle"):
         decode_triangles(stream[:10] + b"\0" + stream[10:], 21, "here")
 
 
@@ -189,11 +189,11 @@ def test_exponential_floats():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"mode": "POINTS"}, r"mode: must be ATTRIBUTES, TRIANGLES, INDICES, got 'POINTS'"),
-        ({"filter": "WAVELET"}, r"filter: is not one for mode ATTRIBUTES, got 'WAVELET'"),
-        ({"byteStride": 10}, r"byteStride: is not one for ATTRIBUTES and NONE, got 10"),
+        ({"mode": "POINTS"}, r"mode: must be one of ATTRIBUTES, TRIANGLES, INDICES, got 'POINTS'"),
+        ({"filter": "WAVELET"}, r"filter: is not allowed with mode ATTRIBUTES, got 'WAVELET'"),
+        ({"byteStride": 10}, r"byteStride: is not allowed with mode ATTRIBUTES and filter NONE, got 10"),
         ({"count": 4}, r"byteLength: must be count times byteStride, 48, got 36"),
-        ({"byteLength": 9}, "holds no EXT_meshopt_compression stream of attributes"),
+        ({"byteLength": 9}, "must be an EXT_meshopt_compression stream of attributes"),
     ],
 )
 def test_a_triangle_stored_compressed(triangle, change, message):

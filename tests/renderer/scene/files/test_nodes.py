@@ -76,7 +76,7 @@ def test_only_the_active_scene_is_read(triangle):
     del triangle.document["scene"]
     scene = read_scene(triangle.write())
     assert [instance.name for instance in scene.instances] == ["a"]
-    assert scene.warnings == ("the file names none of its 2 scenes: the first is read",)
+    assert scene.warnings == ("the file selects none of its 2 scenes: the first one is read",)
     del triangle.document["scenes"]
     scene = read_scene(triangle.write())
     assert len(scene.instances) == 3
@@ -167,7 +167,7 @@ def test_a_rotation_off_unit_length_is_normalised_aloud(triangle):
     triangle.node["rotation"] = [0, 0, 3, 3]
     scene = read_scene(triangle.write())
     np.testing.assert_allclose(placed_corners(scene), [[0, 0, 0], [0, 1, 0], [-1, 0, 0]], atol=1e-12)
-    assert scene.warnings == ("1 node has a rotation that is no unit quaternion; it is normalised",)
+    assert scene.warnings == ("1 node has a rotation that is not a unit quaternion; it is normalised",)
 
 
 def test_morph_targets_at_the_default_weights(triangle):

@@ -100,7 +100,7 @@ def test_missing_textures_and_libraries_are_said(tmp_path):
     assert scene.warnings == (
         "material library 'none.mtl' cannot be read; white is used",
         "1 material is not defined in any library; white is used",
-        "2 textures missing ('no.png', …); Kd is used alone, white where there is none",
+        "2 textures missing ('no.png', …); Kd alone is used, or white without it",
     )
 
 
@@ -166,5 +166,5 @@ def test_what_is_no_surface_is_said(tmp_path):
         "1 face of fewer than 3 corners is ignored",
         "2 point or line elements are ignored",
         "free-form curves and surfaces are ignored",
-        "1 line of unknown meaning is ignored",
+        "1 unknown keyword is ignored",
     )

@@ -164,7 +164,7 @@ class TestDraco:
 
     def test_counts_that_differ_from_the_accessors_are_refused(self, gltf):
         self.compressed(gltf).document["accessors"][-1]["count"] = 27
-        with pytest.raises(InputError, match="holds 30 indices, its accessor says 27"):
+        with pytest.raises(InputError, match="holds 30 indices, but its accessor says 27"):
             read_scene(gltf.write())
 
     def test_a_broken_bitstream_is_refused(self, gltf):

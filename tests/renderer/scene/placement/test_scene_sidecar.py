@@ -84,7 +84,7 @@ def test_point_and_directional(tmp_path):
         (SPOT.replace("intensity = 10", "intensity = -1"), "'intensity' must not be negative"),
         (SPOT.replace("intensity = 10", "intensity = inf"), "'intensity' must be 1 or 3 finite numbers"),
         (SPOT.replace("= 30", "= 70"), r"cone angles must satisfy 0 ≤ inner < outer"),
-        (SPOT + "direction = [0, -1, 0]\n", "give one of 'direction' and 'look_at'"),
+        (SPOT + "direction = [0, -1, 0]\n", "must have either 'direction' or 'look_at', got both"),
         (SPOT.replace("[0.0, 0.0, 2.0]", "[0.0, 2.0, 0.0]"), "direction must not be zero"),
         (SPOT.replace("spot", "point"), "unknown key 'look_at'"),
     ],

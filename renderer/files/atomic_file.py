@@ -13,8 +13,8 @@ from vpltune.renderer.errors import InputError
 def written_whole(path: Path) -> Iterator[Path]:
     """Yield a temporary path beside `path`; on success, sync it and rename it to `path`.
 
-    The temporary file has the same suffix, because image writers may depend on it. On any exception, including
-    an interrupt, it is removed and `path` stays as it was.
+    The temporary file has the same suffix, because image writers may depend on it. On any exception or
+    interrupt, it is removed and `path` stays as it was.
 
     Raises:
         InputError: the folder cannot be created or written to, or `path` is itself a folder.

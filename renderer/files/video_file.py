@@ -22,8 +22,8 @@ def check_clip_path(path: Path, size: tuple[int, int]) -> None:
     """Check that a clip of `size` = (width, height) pixels can be written to `path`. Call it before drawing.
 
     Raises:
-        InputError: the path is neither an .mp4 nor a folder, or an .mp4 would have an odd width or height. Its
-            chroma has half the resolution, so both must be even.
+        InputError: the path is neither an .mp4 nor a folder, or an .mp4 would have an odd width or height
+            (its chroma has half the resolution).
     """
     suffix = path.suffix.lower()
     if suffix == ".mp4":

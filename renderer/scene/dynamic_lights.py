@@ -37,9 +37,9 @@ touches are affected.
 """
 
 # The accumulation unit, in units of the largest I/range² of all lights. Half floats have full precision from
-# 2⁻¹⁴ to 2¹⁶. The strongest light gives at most I/range²/MIN_DISTANCE² = 2¹⁸·I/range². Storing its I/range² as
-# 2⁻⁴ leaves room for four such lights at one point, and a light 1,000 times weaker still has full precision
-# where it gives its own I/range².
+# 2⁻¹⁴ to 2¹⁶. The strongest light gives at most I/range²/MIN_DISTANCE² = 2¹⁸·I/range². Storing its I/range²
+# as 2⁻⁴ leaves room for four such lights at one point, and a light 1,000 times weaker still has full
+# precision where it gives its own I/range².
 _UNIT_IN_STRONGEST = 2.0**4
 
 
@@ -86,7 +86,8 @@ def spot_lights(
     """
     if not 0.0 <= inner_cone < outer_cone <= math.pi / 2:
         raise ValueError(
-            f"spot_lights: cone angles must satisfy 0 ≤ inner < outer ≤ π/2, got {inner_cone} and {outer_cone}"
+            f"spot_lights: cone angles must satisfy 0 ≤ inner < outer ≤ π/2, "
+            f"got {inner_cone} and {outer_cone}"
         )
     records = point_lights(positions_world, intensity, range_world)
     records["direction_world"] = directions_world

@@ -1,4 +1,4 @@
-"""The RSM faces of each light: one for a narrow spot or the sun, five for a wide spot, six for a point light."""
+"""The RSM faces of lights: one for a narrow spot or the sun, five for a wide spot, six for a point light."""
 
 import math
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ LIGHT_DTYPE = np.dtype(
         ("faces", "i4", 4),
     ]
 )
-"""A light in shaders/common/lights.glsl (std430). `faces` is the first face, the number of faces and padding."""
+"""A light in shaders/common/lights.glsl (std430). `faces` holds the first face and the number of faces."""
 FACE_DTYPE = np.dtype(
     [
         ("light_to_world", "f4", (4, 4)),
@@ -60,7 +60,7 @@ _CUBE = np.array(
 
 
 SIZE_STEP = 2.0**0.125
-"""A choice: ratio between consecutive sizes of a snapped face. It costs at most 1/12 of the texels per axis."""
+"""A choice: ratio of consecutive sizes of a snapped face. It costs at most 1/12 of the texels per axis."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class LightRecords:
     faces: np.ndarray
     """[faces] of `FACE_DTYPE`."""
     moment_origin: tuple[float, float, float]
-    """Origin of the first face, world units. Sums of squared distances from near a light lose least precision."""
+    """Origin of the first face, world units. Sums of squared distances from it lose little precision."""
 
 
 def face_count(lights: tuple[Light, ...]) -> int:
@@ -157,8 +157,8 @@ def _sun_face(light: Light, index: int, bounds: np.ndarray, snapping: FaceSnappi
 
 
 def _snapped(extent: np.ndarray, center: np.ndarray, snapping: FaceSnapping) -> tuple[np.ndarray, np.ndarray]:
-    """The extent rounded up to a size step, and the center rounded to the grid of that size."""
-    # Rounding moves the center by up to half a cell, which is 1/cells of the extent.
+    """The extent rounded up to a size step, and the centre rounded to the grid of that size."""
+    # Rounding moves the centre by up to half a cell, which is 1/cells of the extent.
     needed = extent * (1.0 + 1.0 / (snapping.cells - 1.0))
     steps = np.ceil(np.log(needed / snapping.length) / math.log(SIZE_STEP))
     extent = snapping.length * SIZE_STEP**steps

@@ -30,14 +30,14 @@ SPOT_CONE = (math.radians(20.0), math.radians(35.0))
 SPOT_SHARE = 0.25
 """A choice: share of the lights that are spots."""
 SPOT_RANGE = 2.0
-"""A choice: range of a spot relative to that of a point light. A spot concentrates its flux, so it reaches farther."""
+"""A choice: range of a spot in ranges of a point light. Its flux is concentrated, so it reaches farther."""
 
 BRIGHTNESS = 0.125
-"""A choice: irradiance from all moving lights, relative to that from the view's own lights (`flux_beside`)."""
+"""A choice: irradiance from all moving lights, relative to that from the view's lights (`flux_beside`)."""
 
 
 class BouncingLights:
-    """`count` lights that move through a scene. `SPOT_SHARE` of them are spots, which shine the way they move.
+    """`count` lights that move through a scene. `SPOT_SHARE` of them are spots, pointed along their velocity.
 
     `records` holds the lights at the current time, [count] of `DYNAMIC_LIGHT_DTYPE`, points before spots.
 

@@ -1,4 +1,4 @@
-"""Bounds of a moving scene from a few boxes that move with its instances and joints, not from all vertices."""
+"""Bounds of a moving scene from boxes that move with its instances and joints, instead of all vertices."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ _CORNERS = np.array([[(corner >> axis) & 1 for axis in range(3)] for corner in r
 
 @dataclass(frozen=True, eq=False)
 class PlacedBoxes:
-    """Boxes in the local space of an instance or a joint, each with the index of the matrix that places it."""
+    """Boxes in the local space of an instance or joint, each with the index of the matrix that places it."""
 
     corners: Float64[np.ndarray, "boxes 8 3"]
     matrices: Int64[np.ndarray, " boxes"]
@@ -33,8 +33,8 @@ class PlacedBoxes:
 def placed_boxes(scene: Scene) -> PlacedBoxes:
     """One box for each instance, or for a skinned instance one for each joint, around the vertices it moves.
 
-    Linear blend skinning puts a vertex between the positions that its joints alone would give it. A box around
-    the joints' boxes therefore contains it.
+    Linear blend skinning puts a vertex between the positions that each of its joints alone would give it. A
+    box around the joints' boxes therefore contains it.
     """
     skins = () if scene.animation is None else scene.animation.skins
     first_joints = len(scene.instances) + np.cumsum([0] + [len(skin.joints) for skin in skins])

@@ -90,9 +90,9 @@ def _index_of(wanted: object, among: tuple) -> int | None:
 
 
 def _looked_at(camera: Camera, center: Float64[np.ndarray, "3"]) -> Float64[np.ndarray, "3"]:
-    """The point in front of the camera, on its axis, that is nearest to the center of the scene.
+    """The point in front of the camera, on its axis, that is nearest to the centre of the scene.
 
-    It is at least a quarter of the distance to the center away.
+    It is at least a quarter of the distance to the centre away.
     """
     forward = -camera.to_world[:3, 2]
     distance = float(np.dot(center - camera.position_world, forward))

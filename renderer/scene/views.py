@@ -14,15 +14,15 @@ from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.renderer.scene.scene import Camera, Light, scaled_camera, scaled_light
 
 Split = Literal["fitted", "validation", "held_out"]
-"""What a view is for. Parameters are fitted to `fitted` views, `validation` views choose between the candidates
-of a fit, and `held_out` views choose nothing: error is only measured on them."""
+"""What a view is for. Parameters are fitted to `fitted` views, `validation` views choose between the
+candidates of a fit, and `held_out` views choose nothing: error is only measured on them."""
 SPLITS: tuple[Split, ...] = get_args(Split)
 """Every value of `Split`."""
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """One image to render. Rays go through pixel centers; row 0 is at the top."""
+    """One image to render. Rays go through pixel centres; row 0 is at the top."""
 
     name: str
     split: Split
@@ -44,7 +44,7 @@ def scaled_view(view: View, factor: float) -> View:
 
 
 def ray_directions_world(view: View) -> Float64[np.ndarray, "height width 3"]:
-    """Directions from the eye through the pixel centers, scaled to unit depth along the view axis."""
+    """Directions from the eye through the pixel centres, scaled to unit depth along the view axis."""
     width, height = view.size
     tan_half = math.tan(view.camera.yfov / 2.0)
     x = (2.0 * (np.arange(width) + 0.5) / width - 1.0) * tan_half * width / height

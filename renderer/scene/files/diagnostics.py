@@ -4,10 +4,10 @@ from collections import Counter
 
 
 class SceneFileError(ValueError):
-    """A scene file breaks a rule. The message names key, rule and value; `read_scene` prepends the file name."""
+    """A scene file breaks a rule. The message names key, rule and value; `read_scene` prepends the file."""
 
 
-# A choice: longest message in characters. Messages are for a terminal, but a file can hold a name of a megabyte.
+# A choice: longest message in characters. It is for a terminal; a name in a file can be a megabyte long.
 _LONGEST = 400
 
 

@@ -67,7 +67,7 @@ class GltfAccessors:
         """The elements of the accessor to which `key` of `holder` refers. Its type must be one of `types`.
 
         Raises:
-            SceneFileError: the index, the type, the component type or the extent is invalid, or the buffer is.
+            SceneFileError: the index, type, component type, extent or buffer of the accessor is invalid.
         """
         accessors = self._document.list_of("accessors")
         accessor = accessors[holder.required_index(key, len(accessors), "accessors")]

@@ -49,8 +49,8 @@ class Placed:
 def read_channels(document: GltfDocument, nodes: GltfNodes, accessors: GltfAccessors) -> list[Channel]:
     """The valid channels of all animations. `Channel.node` is an index into the document's nodes.
 
-    All animations play at once, and each loops with its own period. If two channels animate the same property of
-    a node, the first one wins.
+    All animations play at once, and each loops with its own period. If two channels animate the same property
+    of a node, the first one wins.
     """
     try:
         clips = [(clip, clip.objects("channels")) for clip in document.list_of("animations")]
@@ -82,7 +82,8 @@ def read_channels(document: GltfDocument, nodes: GltfNodes, accessors: GltfAcces
         document.warnings.add(f"{len(faults)} of {total} animation channels are left out: {faults[0]}")
     if repeated:
         document.warnings.add(
-            f"{repeated} of {total} animation channels are left out: an earlier one animates the same property"
+            f"{repeated} of {total} animation channels are left out: an earlier one animates the same "
+            "property"
         )
     return list(taken.values())
 
@@ -128,7 +129,7 @@ def placed_animation(channels: Sequence[Channel], placed: Placed, nodes: GltfNod
 def _channel(
     clip: JsonObject, member: JsonObject, document: GltfDocument, nodes: GltfNodes, accessors: GltfAccessors
 ) -> list[Channel]:
-    """The channel with its duration still unset. The list is empty if the channel animates nothing supported."""
+    """The channel, with its duration still unset, or nothing if what it animates is not supported."""
     target = member.required_object("target")
     animated = target.string("path")
     if animated in ("weights", "pointer"):

@@ -166,7 +166,7 @@ def skinned(
 ) -> tuple[Float32[np.ndarray, "n 3"], Float32[np.ndarray, "n 3"] | None]:
     """Positions and normals in world space by linear blend skinning.
 
-    Each vertex is transformed by the weighted sum of its joints' matrices, its normal by the cofactors of that.
+    The weighted sum of its joints' matrices transforms each vertex, and the cofactors of the sum its normal.
 
     Args:
         positions: in the bind pose.

@@ -51,7 +51,7 @@ def read_camera(
 def read_light(
     light: JsonObject, to_world: Float64[np.ndarray, "4 4"], document: GltfDocument
 ) -> Light | None:
-    """The punctual light of a node, which shines along the node's −Z. The node's scale does not affect intensity.
+    """The punctual light of a node. It shines along the node's −Z; the scale does not affect intensity.
 
     Args:
         light: the light object.

@@ -25,7 +25,7 @@ def decompressed_view(
         decoded: the memory limit.
 
     Raises:
-        SceneFileError: a key is missing or out of range, the stream is broken, or it exceeds the memory limit.
+        SceneFileError: a key is missing or out of range, the stream is broken, or memory runs out.
     """
     mode = compression.string("mode")
     if mode not in _MODES:

@@ -147,7 +147,7 @@ class GltfPrimitives:
         used: Int64[np.ndarray, " used"],
         deformation: Deformation,
     ) -> tuple[Float32[np.ndarray, "used 3"], Float32[np.ndarray, "used 3"] | None, Skinning | None]:
-        """Morphed and skinned positions and normals of the used vertices, and the skinning if it is animated."""
+        """Morphed and skinned positions and normals of the used vertices, and the skinning if animated."""
         placed: dict[str, Float32[np.ndarray, "used 3"]] = {}
         for semantic in ("POSITION", "NORMAL"):
             if semantic in attributes:

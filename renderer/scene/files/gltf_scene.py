@@ -94,7 +94,7 @@ class _SceneBuilder:
         deformation = read_deformation(
             node, mesh, self.document, self.nodes, self.accessors, self._moving_nodes
         )
-        # The joints alone place a skinned mesh; the transform of its own node is ignored (glTF 2.0 section 3.7.3).
+        # Only joints place a skinned mesh; its node's transform is ignored (glTF 2.0 section 3.7.3).
         is_placed_by_joints = deformation.joint_to_world is not None
         local = np.eye(4)[None] if is_placed_by_joints else self._placements(index, node)
         to_world = local if is_placed_by_joints else self.nodes.to_world(index) @ local

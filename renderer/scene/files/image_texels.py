@@ -17,10 +17,11 @@ from vpltune.renderer.scene.files.limits import (
     TEXELS_PER_BYTE,
 )
 
-# Names of PIL formats: those that glTF and EXT_texture_webp allow, and those accepted for OBJ, PLY and Mitsuba.
+# PIL's names of the formats that glTF and EXT_texture_webp allow.
 GLTF_FORMATS = ("PNG", "JPEG", "WEBP")
 # A choice: rows converted at a time. Converting all at once would hold a large image three times in memory.
 _STRIP_ROWS = 256
+# A choice: PIL's names of the formats accepted for OBJ, PLY and Mitsuba.
 MTL_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA")
 
 

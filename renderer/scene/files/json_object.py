@@ -22,8 +22,8 @@ class JsonObject:
     """A JSON object and its place in the document.
 
     The getters return a typed value by key. If the key is absent, they return the default, if there is one.
-    They raise SceneFileError with place and value if the value has the wrong type or is out of range, or if the
-    key is absent and there is no default.
+    They raise SceneFileError with place and value if the value has the wrong type or is out of range, or if
+    the key is absent and there is no default.
     """
 
     members: dict[str, Any]

@@ -1,4 +1,4 @@
-"""Size limits of scenes. They are checked before memory is allocated: a kilobyte file can ask for a terabyte."""
+"""Size limits of scenes, checked before memory is allocated: a file of a kilobyte can ask for a terabyte."""
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
 
@@ -25,7 +25,7 @@ MAX_IMAGE_SIDE = 16384
 
 MAX_IMAGE_TEXELS = 1 << 26
 MAX_SCENE_TEXELS = 3 << 26
-"""Choices: texels of one image, and of all images. A texel takes 3 bytes, and 7 while its image is decoded."""
+"""Choices: texels of one image, and of all images. A texel takes 3 bytes, or 7 during decoding."""
 
 FREE_TEXELS = 1 << 26
 TEXELS_PER_BYTE = 64
@@ -41,7 +41,7 @@ SMALLEST_EXTENT = 1e-15
 """A choice: smallest diagonal of a scene in world units. Areas in a smaller scene underflow in float32."""
 
 LARGEST_RADIOMETRIC = 1e18
-"""A choice: largest intensity of a light in W/sr or W/m². Times any albedo and area, it is finite in float32."""
+"""A choice: largest intensity of a light, W/sr or W/m². Times any albedo and area it is finite in float32."""
 
 
 class DecodedBytes:

@@ -8,13 +8,17 @@ from jaxtyping import Int64, UInt8
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
 
-# From the specification of the bitstream: header byte of version 0; differences in a group; size limits of a
-# block in bytes and in elements; least size of the tail, which ends with the baseline of the differences.
+# All numbers are from the specification of the bitstream.
 _HEADER = 0xA0
+"""First byte of a stream of version 0."""
 _GROUP = 16
+"""Differences in a group."""
 _BLOCK_BYTES = 8192
+"""Most bytes of a decoded block."""
 _LARGEST_BLOCK = 256
+"""Most elements of a block."""
 _SMALLEST_TAIL = 32
+"""Least size in bytes of the tail, which ends with the baseline of the differences."""
 _PACKED_BYTES = (0, 4, 8, 16)
 """Size in bytes of a group in modes 0 to 3: no bits (all zero), 2, 4 and 8 bits per difference."""
 
@@ -101,7 +105,7 @@ def _sentinels_by_byte(bits: int) -> list[int]:
 def _with_sentinels(
     stored: UInt8[np.ndarray, "bytes"], places: Int64[np.ndarray, " groups"], bits: int
 ) -> UInt8[np.ndarray, "groups 16"]:
-    """Decode groups of 2 or 4 bits per difference. If all bits are set, the difference is a byte that follows."""
+    """Decode groups of 2 or 4 bits per difference. If all are set, the difference is a byte that follows."""
     packed = stored[places[:, None] + np.arange(2 * bits)]
     shifts = np.arange(8 - bits, -1, -bits, dtype=np.uint8)
     full = np.uint8((1 << bits) - 1)

@@ -8,13 +8,17 @@ from jaxtyping import UInt32
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
 
-# From the specification of the bitstream: header bytes of version 1, and sizes of the tails in bytes.
+# All numbers are from the specification of the bitstream.
 _TRIANGLES_HEADER = 0xE1
+"""First byte of a stream of triangles, version 1."""
 _INDICES_HEADER = 0xD1
+"""First byte of a stream of indices, version 1."""
 _TRIANGLES_TAIL = 16
+"""Bytes of the tail, a table of common codes."""
 _INDICES_TAIL = 4
-# Mask for 32-bit arithmetic.
+"""Bytes of the tail, which are padding."""
 _WORD = 0xFFFFFFFF
+"""Mask for arithmetic on 32-bit indices."""
 
 
 def decode_triangles(content: bytes, count: int, where: str) -> UInt32[np.ndarray, " count"]:

@@ -63,7 +63,7 @@ class MtlMaterials:
                     self._warnings.add(f"material library {name!r:.80} cannot be read; white is used")
 
     def add(self, name: str) -> int:
-        """Create the material `name` and return its index in `materials`. It is white if no library defines it.
+        """Create a material, white if no library defines it, and return its index in `materials`.
 
         Raises:
             SceneFileError: the material's map exists but is a broken image.

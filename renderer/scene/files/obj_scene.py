@@ -64,7 +64,7 @@ _BYTES_PER_LINE = 300
 
 @dataclass
 class _Faces:
-    """Faces of one material: corners as indices into `_ObjText.corners`, and the corner count of each face."""
+    """Faces of one material: corners as indices into `_ObjText.corners`, and each face's corner count."""
 
     corners: list[int] = field(default_factory=list)
     sizes: list[int] = field(default_factory=list)

@@ -9,21 +9,23 @@ from jaxtyping import Float64, Int64
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
 from vpltune.renderer.scene.files.limits import DecodedBytes
 
-# PLY's scalar types as format characters of the struct module, and byte orders by the format's name.
+# PLY's scalar types as format characters of the struct module.
 _TYPES = {
     "char": "b", "int8": "b", "uchar": "B", "uint8": "B", "short": "h", "int16": "h", "ushort": "H",
     "uint16": "H", "int": "i", "int32": "i", "uint": "I", "uint32": "I", "float": "f", "float32": "f",
     "double": "d", "float64": "d",
 }  # fmt: skip
+# Byte orders of the struct module by the name of the format; ASCII has none.
 _BYTE_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
-# Choices: most bytes of a header, and most characters of a number in ASCII data.
+# A choice: most bytes of a header.
 _LONGEST_HEADER = 1 << 16
+# A choice: most characters of a number in ASCII data.
 _LONGEST_NUMBER = 64
 
 
 @dataclass(frozen=True)
 class PlyProperty:
-    """A scalar property, or a list property if it has a `count_type`. Types are those of the struct module."""
+    """A scalar property, or a list if it has a `count_type`. Types are those of the struct module."""
 
     name: str
     type: str
@@ -195,7 +197,7 @@ class PlyData:
         }
 
     def _width(self, type_: str) -> int:
-        """Size of a number in the source: bytes, or 1 in an ASCII file, whose source is an array of numbers."""
+        """Size of a number in the source: its bytes, or 1 for ASCII, where the source is an array."""
         return struct.calcsize(f"<{type_}") if self._order else 1
 
     def _number(self, at: int, type_: str, element: PlyElement) -> int:

@@ -27,7 +27,7 @@ def read_scene(path: str | Path) -> Scene:
     line for each thing that is ignored or approximated.
 
     Raises:
-        InputError: the file is invalid, unsupported or too large. The message is one line with file and cause.
+        InputError: the file is invalid, unsupported or too large; one line names the file and the cause.
     """
     path = Path(path)
     try:

@@ -33,8 +33,8 @@ def finished_mesh(
 ) -> Mesh | None:
     """The mesh of a surface, without triangles of zero area and with unit normals.
 
-    With normals in the file, vertices stay shared. Without them, shading is flat and no vertices are shared, as
-    glTF 2.0 section 3.7.2.1 requires. A corner with a zero normal gets the normal of its triangle.
+    With normals in the file, vertices stay shared. Without them, shading is flat and no vertices are shared,
+    as glTF 2.0 section 3.7.2.1 requires. A corner with a zero normal gets the normal of its triangle.
 
     Args:
         surface: the triangles.

@@ -20,17 +20,18 @@ from vpltune.renderer.scene.files.scene_folder import SceneFolder
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
 from vpltune.renderer.scene.scene import Light
 
-# A choice: an emitter faces one direction if the vector sum of its triangles' areas has at least this share of
-# its area.
+# A choice: an emitter faces one direction if the vector sum of its triangles' areas is at least this share
+# of its area.
 _FACES_ONE_WAY = 0.9
-# A choice: distance of a spot from its emitting surface, relative to √area. It exceeds the rounding of the plane.
+# A choice: distance of a spot from its emitting surface in units of √area, enough to clear rounding.
 _LIFT = 1e-3
 # A choice: half angle of the part of an environment that becomes one directional light, radians.
 _SUN_CONE = math.radians(30.0)
 # A choice: rows of the coarse map in which the brightest part of an environment is searched; 7.5° each.
 _COARSE_ROWS = 24
-# Choices: most lights kept, and the share of the total flux that the weakest lights together may lose.
+# A choice: most lights kept.
 MOST_LIGHTS = 8
+# A choice: the weakest lights are left out if together they carry at most this share of the total flux.
 _LEAST_SHARE = 0.01
 
 
@@ -123,7 +124,9 @@ def punctual_light(
 
 
 def strongest(lights: list[tuple[Light, float]], warnings: Warnings) -> tuple[Light, ...]:
-    """The strongest lights, in their order: at most `MOST_LIGHTS`, without the weakest that carry 1 % of the flux.
+    """At most `MOST_LIGHTS` of the strongest lights, without the weakest that carry 1 % of the flux.
+
+    The order of the lights is kept.
 
     Args:
         lights: each with its flux in W.
@@ -208,11 +211,11 @@ def _environment(
     total = float(flux.sum(axis=0).mean())
     brightest = int(strength.argmax())
     share = float(strength[brightest]) / total if total > 0.0 else 0.0
-    # An environment whose brightest cone has less than 1.5 times its share of a uniform one has no main direction.
+    # No main direction: the brightest cone has less than 1.5 times its share of a uniform environment.
     if share < 1.5 * (1.0 - math.cos(_SUN_CONE)) / 2.0:
         warnings.add(
-            f"the environment {name!r:.80} is ignored: it lights from all directions, which no punctual light "
-            "can represent"
+            f"the environment {name!r:.80} is ignored: it lights from all directions, which no punctual "
+            "light can represent"
         )
         return None
     towards = vectors[brightest].mean(axis=1)

@@ -19,7 +19,7 @@ from vpltune.renderer.scene.mitsuba_import.shapes import Shape, shape_triangles
 from vpltune.renderer.scene.mitsuba_import.xml_tree import parse_xml
 from vpltune.renderer.scene.scene import Camera, Instance, Light, Mesh, Scene, transform_points, without_scale
 
-# Plugins at the top level that do not affect the imported scene, or only through others: no warning for these.
+# Top-level plugins that do not affect the imported scene, or only through others: no warning for these.
 _SILENT = ("integrator", "sampler", "film", "rfilter", "bsdf", "texture")
 
 
@@ -116,7 +116,7 @@ class _Import:
         return finished_mesh(surface, name, surfacing.material, self.decoded, plugin.where)
 
     def _add_area_light(self, plugin: Plugin, shape: Shape, to_world: Float64[np.ndarray, "4 4"]) -> bool:
-        """Add the light of an emitting shape; true if the surface must be removed because it encloses the light."""
+        """Add the light of an emitting shape. True if its surface encloses the light and must be removed."""
         emitters = plugin.of_kind("emitter")
         if not emitters:
             return False
@@ -124,7 +124,7 @@ class _Import:
         corners = transform_points(to_world, surface.positions)[surface.triangles]
         outwards = -1.0 if plugin.flag("flip_normals", False) else 1.0
         if plugin.type not in ("obj", "ply", "cube") and np.linalg.det(to_world[:3, :3]) < 0.0:
-            # Mitsuba transforms the normals of analytic shapes, but those of a mesh follow its mirrored winding.
+            # Mitsuba transforms normals of analytic shapes; those of meshes follow the mirrored winding.
             outwards = -outwards
         found = area_emitter(emitters[0], corners, outwards)
         if found is None:
@@ -134,8 +134,8 @@ class _Import:
             self.warnings.tally(
                 "1 area emitter becomes a spot of the same flux at its centre, along its normal, with a cos² "
                 "falloff",
-                "{n} area emitters become spots of the same flux at their centres, along their normals, with a "
-                "cos² falloff",
+                "{n} area emitters become spots of the same flux at their centres, along their normals, with "
+                "a cos² falloff",
             )
         else:
             self.warnings.tally(
@@ -165,7 +165,8 @@ class _Import:
         height = film.number("height", 576.0) if film else 576.0
         if not (width >= 1.0 and height >= 1.0):
             raise SceneFileError(
-                f"{sensor.where}: the film's width and height must be at least 1, got {width:g} and {height:g}"
+                f"{sensor.where}: width and height of the film must be at least 1, "
+                f"got {width:g} and {height:g}"
             )
         matrix = sensor.to_world()
         if np.linalg.det(matrix[:3, :3]) < 0.0:

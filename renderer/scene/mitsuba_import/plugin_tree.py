@@ -1,4 +1,4 @@
-"""Mitsuba's XML as a tree of plugins, with defaults substituted, references resolved and names in snake_case."""
+"""Mitsuba's XML as a tree of plugins: defaults substituted, references resolved, names in snake_case."""
 
 import re
 from dataclasses import dataclass, field

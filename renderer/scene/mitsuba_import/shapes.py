@@ -15,7 +15,7 @@ from vpltune.renderer.scene.files.surface import Surface
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
 from vpltune.renderer.scene.scene import Mesh
 
-# A choice: segments of a circle; a sphere has half as many rings. 80 segments lose 0.1 % of the circle's area.
+# A choice: segments of a circle, and twice the rings of a sphere. 80 segments lose 0.1 % of a circle's area.
 _SIDES = 80
 
 
@@ -25,11 +25,11 @@ class Shape:
 
     surface: Surface
     to_shape: Float64[np.ndarray, "4 4"]
-    """Such as the center and radius of a sphere; the identity if there are none."""
+    """Such as the centre and radius of a sphere; the identity if there are none."""
 
 
 def shape_triangles(shape: Plugin, path: Path, folder: SceneFolder, warnings: Warnings) -> Shape:
-    """The triangles of a shape. Texture coordinates have their origin at the top left, as in Mitsuba and glTF.
+    """The triangles of a shape. The origin of texture coordinates is at the top left, as in Mitsuba and glTF.
 
     Args:
         shape: the plugin.

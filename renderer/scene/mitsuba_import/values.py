@@ -47,7 +47,7 @@ def numbers(node: XmlNode, key: str, count: int) -> Float64[np.ndarray, " count"
 
 
 def vector(node: XmlNode, absent: float) -> Float64[np.ndarray, "3"]:
-    """Three numbers from `value` (three, or one for all) or from `x`, `y` and `z`, each `absent` if not given.
+    """Three numbers: from `value` (three, or one for all), or from `x`, `y` and `z`, by default `absent`.
 
     Raises:
         SceneFileError: a number cannot be read or is not finite.

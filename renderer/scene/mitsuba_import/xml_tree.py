@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, label
 
-# Choices: limits far above those of real scenes.
+# A choice: most elements of a document, far above those of real scenes.
 _MOST_NODES = 1_000_000
+# A choice: deepest nesting of elements, far above that of real scenes.
 _DEEPEST = 64
 
 
@@ -29,8 +30,8 @@ def parse_xml(content: bytes) -> XmlNode:
     """The root element of a document.
 
     Raises:
-        SceneFileError: the document is not well-formed XML, declares a document type, has too many elements, or
-            is nested too deep.
+        SceneFileError: the document is not well-formed XML, declares a document type, has too many elements
+            or nests them too deep.
     """
     builder = _TreeBuilder()
     try:

@@ -1,7 +1,7 @@
 """An automatic camera for a scene that has none, chosen by how much it sees.
 
-In a room, the camera stands inside, or in front of the open side if there is one. Any other scene counts as an
-object, which the camera looks at from outside. Up is +Y, as in glTF.
+In a room, the camera stands inside, or in front of the open side if there is one. Any other scene counts as
+an object, which the camera looks at from outside. Up is +Y, as in glTF.
 """
 
 import math
@@ -51,7 +51,7 @@ def default_camera_for_lights(scene: Scene, lights: tuple[Light, ...]) -> tuple[
     space = free_space(scene)
     candidates, where = _cameras(space)
     shares = [lit_fraction(space, seen_by(space, camera), lights) for _, camera in candidates]
-    # Half the lit share weighs as much as half the score. Rounding keeps ties independent of the scene's scale.
+    # Half the lit share weighs as much as half the score. Rounding keeps ties independent of scene scale.
     scores = [
         round(score * min(share, ENOUGH_LIT), 9) for (score, _), share in zip(candidates, shares, strict=True)
     ]
@@ -63,7 +63,10 @@ def default_camera_for_lights(scene: Scene, lights: tuple[Light, ...]) -> tuple[
 
 def _camera_note(camera: Camera, where: str) -> str:
     eye = ", ".join(f"{coordinate:.4g}" for coordinate in camera.position_world)
-    return f"camera chosen automatically: {where}, at ({eye}), with a vertical field of view of {math.degrees(camera.yfov):.0f}°"
+    degrees = math.degrees(camera.yfov)
+    return (
+        f"camera chosen automatically: {where}, at ({eye}), with a vertical field of view of {degrees:.0f}°"
+    )
 
 
 def _cameras(space: FreeSpace) -> tuple[list[tuple[float, Camera]], str]:
@@ -80,8 +83,8 @@ def _cameras_inside(space: FreeSpace, places: Places) -> list[tuple[float, Camer
     """The `FINALISTS` best level and slightly lowered views from the free places.
 
     The score is a product. Its factors favour rays that hit surfaces from the front, large and varied depth,
-    nothing close to the camera, a walled-in place and eye height. The finalists are then scored again with the
-    rays of a whole image.
+    nothing close to the camera, a walled-in place and eye height. The finalists are then scored again with
+    the rays of a whole image.
     """
     looks, inside = _looks()
     count = inside.sum(axis=1)
@@ -96,8 +99,8 @@ def _cameras_inside(space: FreeSpace, places: Places) -> list[tuple[float, Camer
     # The square root of the visible area, if every surface faced the camera.
     reach = np.sqrt(np.where(places.front, depth**2, 0.0) @ inside.T / count) / diagonal
     near = (places.hit & (places.distance < NEAR * diagonal)) @ inside.T / count
-    # A place surrounded by front faces is in a room. A fifth of the directions may be open without penalty, as
-    # in a box without a front wall.
+    # A place surrounded by front faces is in a room. A fifth of the directions may be open without penalty,
+    # as in a box without a front wall.
     indoors = np.minimum(places.front.mean(axis=1) / 0.8, 1.0) ** 4
     place_weight = indoors * _eye_height_weight(space, places.positions)
     score = (
@@ -217,7 +220,7 @@ def _cameras_outside(space: FreeSpace) -> list[tuple[float, Camera]]:
             rotation = look_at(back, np.zeros(3))[:3, :3]
             local = (occupied - target) @ rotation
             tan_y = math.tan(0.5 * OBJECT_YFOV)
-            # Far enough for every voxel to be in the image: z + |y|/tan and z + |x|/(tan · 4/3). 2 % is margin.
+            # Far enough for every voxel to be in the image: z + |y|/tan and z + |x|/(tan · 4/3), plus 2 %.
             reach = np.maximum(np.abs(local[:, 1]) / tan_y, np.abs(local[:, 0]) / (tan_y * 4.0 / 3.0))
             distance = 1.02 * float((reach + local[:, 2]).max())
             eye = space.to_world(target + distance * back)

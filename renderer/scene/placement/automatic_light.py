@@ -1,4 +1,4 @@
-"""An automatic spot light for a scene that has none, chosen by what it lights and what the camera sees of that.
+"""An automatic spot light for a scene that has none, chosen by what it lights and what the camera sees.
 
 In a room the light hangs high up inside. An object is lit from outside. Up is +Y.
 """
@@ -28,17 +28,19 @@ from vpltune.renderer.scene.placement.sight import (
 )
 from vpltune.renderer.scene.scene import Camera, Light, Scene
 
-# Choices: inner and outer half angles of the spot in a room and beside an object, radians.
+# A choice: inner and outer half angle of the spot in a room, radians.
 ROOM_CONE = (math.radians(35.0), math.radians(55.0))
+# A choice: inner and outer half angle of the spot that lights an object, radians.
 OBJECT_CONE = (math.radians(18.0), math.radians(27.0))
 # A choice: directions on the sphere, of which those in the cone are used to score a spot.
 CONE_DIRECTIONS = 512
 # A choice: the best share of the image to light directly. The rest shows indirect light.
 BEST_LIT = 0.45
-# A choice: a surface nearer to the light than this share of the RMS distance of all lit surfaces is overexposed.
+# A choice: a surface is overexposed if it is nearer to the light than this share of the RMS distance of all
+# lit surfaces.
 BURNT = 0.45
-# A choice: irradiance in W/m² at the RMS distance of the lit surfaces, in each channel. A white diffuse surface
-# there has a radiance of 1.
+# A choice: irradiance in W/m² at the RMS distance of the lit surfaces, in each channel. A white diffuse
+# surface there has a radiance of 1.
 MEAN_IRRADIANCE = math.pi
 
 
@@ -66,7 +68,7 @@ def _spot(
     inner_cone: float,
     outer_cone: float,
 ) -> Light:
-    """A spot that gives `MEAN_IRRADIANCE` at the RMS distance of the surfaces it lights, at any scene scale."""
+    """A spot that gives `MEAN_IRRADIANCE` at the RMS distance of the surfaces that it lights."""
     dark = Light(
         "spot", np.zeros(3), position_world, direction_world, inner_cone, outer_cone, "automatic spot"
     )

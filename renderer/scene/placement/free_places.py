@@ -11,14 +11,15 @@ from vpltune.renderer.scene.placement.sight import front_facing
 
 # A choice: smallest distance between a camera or light and the nearest occupied voxel, in voxels.
 CLEARANCE = 2.0
-# Choices: most places in a scene, and directions looked along from each.
+# A choice: most places in a scene.
 PLACES = 1200
+# A choice: directions in which rays are marched from each place.
 PLACE_DIRECTIONS = 256
-# Choices: a place is walled in if at least this share of its directions hits a surface, and at least this share
-# of those hits a front face.
+# Choices: a place is walled in if at least this share of its directions hits a surface, and at least this
+# share of those hits a front face.
 WALLED_IN, FROM_FRONT = 0.85, 0.7
-# A scene is a room if at least this share of its free places is walled in. Measured: 0.04 to 0.9 in ten rooms,
-# levels and courtyards; 0.00 to 0.01 in five objects, one of them a hollow tower.
+# A scene is a room if at least this share of its free places is walled in. Measured: 0.04 to 0.9 in ten
+# rooms, levels and courtyards; 0.00 to 0.01 in five objects, one of them a hollow tower.
 ROOM_SHARE = 0.02
 
 
@@ -60,7 +61,7 @@ def free_places(space: FreeSpace) -> Places:
 
 
 def is_room(space: FreeSpace) -> bool:
-    """Whether the scene is a room (or several) rather than an object: enough of its free space is walled in."""
+    """Whether the scene is a room (or several) rather than an object: enough free space is walled in."""
     return free_places(space).share_walled_in() >= ROOM_SHARE
 
 

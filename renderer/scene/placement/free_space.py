@@ -13,8 +13,9 @@ from jaxtyping import Bool, Float32, Float64, Int64
 
 from vpltune.renderer.scene.scene import Scene, transform_points
 
-# Choices: number of voxels aimed at, and most voxels along the longest side.
+# A choice: number of voxels in the scene's bounds.
 VOXEL_BUDGET = 64**3
+# A choice: most voxels along the longest side. An elongated scene gets fewer voxels because of it.
 LONGEST_SIDE = 128
 # A choice: empty voxels around the scene's bounds. The odd fraction keeps surfaces at round fractions of the
 # bounds away from voxel faces.
@@ -26,10 +27,10 @@ SAMPLE_BUDGET = 2**24
 SAMPLE_CHUNK = 2**20
 # Largest distance between samples in voxels. A triangle can only miss voxels whose corner it clips by less.
 SAMPLE_SPACING = 0.3
-# Voxel coordinates are rounded to this many decimals: coarser than double rounding at any scene scale, and much
-# finer than a voxel. Scenes at different scales then give the same grid.
+# Voxel coordinates are rounded to this many decimals: coarser than double rounding at any scene scale, and
+# much finer than a voxel. Scenes at different scales then give the same grid.
 DECIMALS = 5
-# Shortest march step in voxels. Half a voxel cannot jump over a surface one voxel thick, except across a corner.
+# Shortest march step in voxels. Half a voxel cannot jump over a surface one voxel thick, except at a corner.
 SHORTEST_STEP = 0.5
 
 

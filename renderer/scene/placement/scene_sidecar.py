@@ -37,8 +37,9 @@ from vpltune.renderer.scene.views import check_cone
 DEFAULT_YFOV_DEGREES = 60.0
 # A choice: half angles if a spot gives none; those of an automatic light in a room.
 DEFAULT_CONE_DEGREES = {"inner_cone_degrees": 35.0, "outer_cone_degrees": 55.0}
-# The keys that a sidecar may have; any other is rejected.
+# The keys that a camera may have; any other is rejected.
 CAMERA_KEYS = ("eye", "look_at", "yfov_degrees")
+# The keys that each type of light may have; any other is rejected.
 LIGHT_KEYS = {
     "spot": ("type", "position", "direction", "look_at", "intensity", *DEFAULT_CONE_DEGREES),
     "point": ("type", "position", "intensity"),
@@ -191,7 +192,8 @@ def _direction(
 ) -> Float64[np.ndarray, "3"]:
     if ("direction" in table) == ("look_at" in table):
         raise InputError(
-            f"{where}: must have either 'direction' or 'look_at', got {'both' if 'look_at' in table else 'neither'}"
+            f"{where}: must have either 'direction' or 'look_at', "
+            f"got {'both' if 'look_at' in table else 'neither'}"
         )
     if "direction" in table:
         direction = _numbers(table, "direction", (3,), where)

@@ -15,8 +15,8 @@ IMAGE = (40, 30)
 MIDDLE_RAYS = np.arange(IMAGE[0] * IMAGE[1]).reshape(IMAGE[1], IMAGE[0])[10:20, 13:27].ravel()
 # A choice: rays of one spot or point light. A directional light has four times as many.
 LIGHT_RAYS = 1024
-# A choice: hits closer together than this, in voxels, count as the same place. Both ends of a marched distance
-# are accurate to about half a voxel.
+# A choice: hits closer together than this, in voxels, count as the same place. Both ends of a marched
+# distance are accurate to about half a voxel.
 SAME_PLACE = 1.8
 # A choice: distance in voxels that a ray skips first if it starts in an occupied voxel.
 LEAVE_WALL = 1.8
@@ -110,7 +110,7 @@ def frame_of(axis: Float64[np.ndarray, "3"]) -> tuple[Float64[np.ndarray, "3"], 
 
 
 def light_hits(space: FreeSpace, light: Light) -> RayHits:
-    """The first hits of a light's rays. Those of a directional light start outside and cover the whole grid."""
+    """The first hits of a light's rays. A directional light's start outside and cover the whole grid."""
     if light.kind == "directional":
         size = float(np.linalg.norm(space.shape))
         u, v = frame_of(light.direction_world)

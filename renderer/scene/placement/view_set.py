@@ -32,8 +32,8 @@ SHORTEST_MOVE = 0.35
 CLEARANCE = 1.8
 # A choice: most moves tried for one view, each smaller than the one before.
 ATTEMPTS = 60
-# Choices: least share of rays that must hit a surface, and of visible surfaces that must be lit directly. If the
-# start view has less, a fraction of its own share is enough.
+# Choices: least share of rays that must hit a surface, and of visible surfaces that must be lit directly. If
+# the start view has less, a fraction of its own share is enough.
 LEAST_HITS, LEAST_LIT = 0.6, 0.08
 # Random stream of each split. The numbers are part of the seed, so changing one changes the views.
 _STREAMS: dict[Split, int] = {"fitted": 0, "held_out": 1, "validation": 2}

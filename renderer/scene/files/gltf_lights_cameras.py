@@ -42,9 +42,7 @@ def read_camera(
         raise SceneFileError(f"{perspective.at('yfov')}: must lie in (0, π) radians, got {yfov:g}")
     rigid = without_scale(to_world)
     if rigid is None:
-        raise SceneFileError(
-            f"{camera.where}: its node must not be scaled to zero, which leaves no direction"
-        )
+        raise SceneFileError(f"{camera.where}: its node must not be scaled to zero: no direction is left")
     return Camera(rigid, yfov)
 
 
@@ -114,5 +112,5 @@ def _cone(light: JsonObject) -> tuple[float, float]:
 def _unit(vector: Float64[np.ndarray, "3"], where: str) -> Float64[np.ndarray, "3"]:
     length = np.linalg.norm(vector)
     if not length > 0.0:
-        raise SceneFileError(f"{where}: its node must not be scaled to zero, which leaves no direction")
+        raise SceneFileError(f"{where}: its node must not be scaled to zero: no direction is left")
     return vector / length

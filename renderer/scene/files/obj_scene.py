@@ -140,7 +140,9 @@ def _parse(content: str, warnings: Warnings) -> _ObjText:
         elif keyword in _FREE_FORM_KEYWORDS:
             warnings.add("free-form curves and surfaces are ignored")
         elif keyword not in _SILENT_KEYWORDS:
-            warnings.tally("1 unknown keyword is ignored", "{n} unknown keywords are ignored")
+            warnings.tally(
+                "1 line with an unknown keyword is ignored", "{n} lines with unknown keywords are ignored"
+            )
     return text
 
 

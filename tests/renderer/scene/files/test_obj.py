@@ -166,5 +166,5 @@ def test_what_is_no_surface_is_said(tmp_path):
         "1 face of fewer than 3 corners is ignored",
         "2 point or line elements are ignored",
         "free-form curves and surfaces are ignored",
-        "1 unknown keyword is ignored",
+        "1 line with an unknown keyword is ignored",
     )

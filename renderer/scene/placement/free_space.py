@@ -25,7 +25,7 @@ MARGIN = 2.37
 SAMPLE_BUDGET = 2**24
 # A choice: samples processed at a time, to bound memory.
 SAMPLE_CHUNK = 2**20
-# Largest distance between samples in voxels. A triangle can only miss voxels whose corner it clips by less.
+# Largest distance between samples in voxels. They can only miss a voxel whose corner is clipped by less.
 SAMPLE_SPACING = 0.3
 # Voxel coordinates are rounded to this many decimals: coarser than double rounding at any scene scale, and
 # much finer than a voxel. Scenes at different scales then give the same grid.

@@ -1,4 +1,4 @@
-"""Images on disk: what is written reads back, orientation and bits kept."""
+"""Image files: what is written reads back with the same orientation and bits."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Accessors: every component type, stride, normalisation and sparse substitution gives the numbers meant."""
+"""Accessors: component types, strides, normalisation and sparse substitution give the right numbers."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
 
 
 def read_positions(gltf):
-    """Triangle corners of the only mesh, in drawing order."""
+    """The triangle corners of the only mesh, in drawing order."""
     (mesh,) = read_scene(gltf.write()).meshes
     return mesh.positions[mesh.triangles].reshape(-1, 3)
 

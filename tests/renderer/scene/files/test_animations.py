@@ -1,4 +1,4 @@
-"""Animations from glTF: what is read, what moves, and what is left out aloud."""
+"""glTF animations: what is read, what moves, and what is left out with a warning."""
 
 import re
 
@@ -44,7 +44,7 @@ def test_a_channel_moves_its_node_and_all_below(triangle):
 
 
 def test_the_scene_itself_stays_at_rest(triangle):
-    """A key at time 0 is no rest pose: still images keep what the nodes say."""
+    """The rest pose comes from the nodes, not from the keys at time 0."""
     triangle.node["translation"] = [7, 0, 0]
     animate(triangle, "translation", [0, 1], [[0, 0, 0], [4, 0, 0]])
     scene = read_scene(triangle.write())
@@ -56,7 +56,7 @@ def test_normalised_integers_are_rotations(triangle):
     stored = np.round(np.array([[0, 0, 0, 1], QUARTER_TURN_ABOUT_Z]) * 32767).astype(np.int16)
     animate(triangle, "rotation", [0, 1], triangle.accessor(stored, normalized=True))
     moved = transform_points(placement(read_scene(triangle.write()), 0.5), np.array([[1, 0, 0]], np.float32))
-    # 1e-4: 16 bits of quaternion.
+    # 1e-4: rounding of 16-bit quaternions.
     np.testing.assert_allclose(moved[0], [np.sqrt(0.5), np.sqrt(0.5), 0], atol=1e-4)
 
 
@@ -75,7 +75,7 @@ def test_clips_play_together_each_in_its_own_time(triangle):
     animate(triangle, "translation", [0, 2], [[0, 0, 0], [2, 0, 0]])
     animate(triangle, "scale", [0, 3], [[1, 1, 1], [4, 4, 4]])
     scene = read_scene(triangle.write())
-    matrix = placement(scene, 2.5)  # half a second into the second round of one, 2.5 s into the other
+    matrix = placement(scene, 2.5)  # 0.5 s into the second loop of one clip, 2.5 s into the other
     np.testing.assert_allclose(matrix, np.diag([3.5, 3.5, 3.5, 1]) + 0.5 * np.eye(4, k=3), atol=1e-12)
     assert scene.animation.duration == 3.0
 
@@ -177,7 +177,7 @@ def test_a_node_with_a_matrix_is_not_animated(triangle):
 
 
 def test_a_motion_out_of_range_is_one_line(triangle):
-    """Each scale is in range, but their product is not."""
+    """Each scale is in range, but the product is not."""
     triangle.document["nodes"] = [{"children": [1]}, {"mesh": 0}]
     clip = animate(triangle, "scale", [0, 1], [[1, 1, 1], [1e14, 1, 1]])
     animate(triangle, "scale", [0, 1], [[1, 1, 1], [1e14, 1, 1]], node=1, clip=clip)
@@ -187,7 +187,7 @@ def test_a_motion_out_of_range_is_one_line(triangle):
 
 
 def test_the_animated_corpus_moves(corpora_folder):
-    """Every valid animation of the Khronos asset generator is read without a word, and most of them move."""
+    """Valid animations of the Khronos asset generator are read without warnings, and most move something."""
     paths = sorted((corpora_folder / "asset_generator" / "Output").glob("Animation_*/*.gltf"))
     assert paths
     still = []
@@ -204,7 +204,7 @@ def test_the_animated_corpus_moves(corpora_folder):
             moved |= np.ptp([pose.joint_matrices for pose in poses], axis=0).max() > 0.0
         if not moved:
             still.append(path.stem)
-    # By the corpus's own README: skins without an animation, and one animation of a single key.
+    # According to the corpus's README, these are skins without animation and an animation with a single key.
     assert still == [
         "Animation_NodeMisc_03", "Animation_Skin_00", "Animation_Skin_02", "Animation_Skin_03",
         "Animation_Skin_04", "Animation_Skin_07", "Animation_Skin_09",

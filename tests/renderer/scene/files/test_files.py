@@ -1,4 +1,4 @@
-"""Files on disk: containers taken apart, nothing opened but regular files in the scene's folder."""
+"""Files: containers are parsed, and only regular files in the scene's folder are opened."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""OBJ: indices of every kind, polygons of every shape, materials, and refusals."""
+"""OBJ: all kinds of indices, polygons of any shape, materials, and rejected files."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def test_forward_references_are_read(tmp_path):
     ("outline", "expected"),
     [
         ([(0, 0), (2, 0), (2, 2), (0, 2)], 4.0),
-        # An arrowhead, from each corner in turn: one of the two diagonals lies outside.
+        # An arrowhead from different first corners: one of its diagonals is outside.
         ([(0, 0), (2, 1), (0, 2), (1, 1)], 1.0),
         ([(2, 1), (0, 2), (1, 1), (0, 0)], 1.0),
         # An L, and a comb with two notches.
@@ -60,7 +60,7 @@ def test_polygons_are_covered_once_whatever_their_shape(tmp_path, outline, expec
     (mesh,) = read_text(tmp_path, text + "f " + " ".join(map(str, range(1, len(outline) + 1)))).meshes
     a, b, c = mesh.positions[mesh.triangles].astype(np.float64).transpose(1, 0, 2)
     vectors = np.cross(b - a, c - a) / 2
-    # Were two triangles to overlap or face away, the areas would add up to more than the outline's own.
+    # If triangles overlapped or faced away, the sum of areas would exceed the area of the outline.
     assert np.linalg.norm(vectors, axis=1).sum() == pytest.approx(expected)
     assert np.linalg.norm(vectors.sum(axis=0)) == pytest.approx(expected)
     assert vectors[:, 3 - sum(axes)].min() * (-1 if is_reversed else 1) > 0 or is_reversed
@@ -83,7 +83,7 @@ def test_materials_textures_and_coordinates(tmp_path):
     np.testing.assert_array_equal(texture.texels_srgb, texels)
     assert texture.wrap_u == "clamp_to_edge"
     np.testing.assert_array_equal(mesh.normals, [[0, 0, 1]] * 4)
-    # v runs upwards in OBJ, and downwards from the first row here.
+    # v points up in OBJ, and down from the first row in a scene.
     by_position = {tuple(p): tuple(t) for p, t in zip(mesh.positions.tolist(), mesh.uv.tolist(), strict=True)}
     assert by_position[(0, 0, 0)] == (0, 1)
     assert by_position[(1, 1, 0)] == (1, 0)

@@ -1,4 +1,4 @@
-"""The TOML beside a scene, and what goes before what."""
+"""The sidecar beside a scene, and the precedence of flags, sidecar, scene file and automatic choice."""
 
 import math
 
@@ -132,7 +132,7 @@ def test_the_files_own_camera_and_light_are_kept():
 def test_a_file_with_a_light_only_gets_a_camera_that_sees_what_is_lit():
     path = next(path for path in OWN_SCENES if path.stem == "gallery")
     full = read_scene(path)
-    # Behind the partition, where the automatic camera on its own does not look.
+    # Behind the partition, where the automatic camera would not look by itself.
     lamp = Light("point", np.ones(3), np.array([4.6, 2.0, 1.0]))
     camera, lights, notes = resolve_camera_and_lights(with_lights(full, lamp), path, None, None)
     space = free_space(full)

@@ -33,7 +33,7 @@ def test_lights_stay_in_free_space():
 
 
 def test_energy_is_kept():
-    """Bounces are elastic: in 20 s the mean energy changes by less than 1 %, that of each light by less than 10 %.
+    """Bounces are elastic: in 20 s the mean energy changes by less than 1 %, that of any light by 10 %.
 
     Single lights change more because a light that skims a surface gets a little speed to leave it.
     """

@@ -24,12 +24,16 @@ MAX_IMAGE_SIDE = 16384
 """Side of an image in texels. Every OpenGL 4.3 driver supports at least this (GL_MAX_TEXTURE_SIZE)."""
 
 MAX_IMAGE_TEXELS = 1 << 26
+"""A choice: texels of one image. A texel takes 3 bytes, or 7 during decoding."""
+
 MAX_SCENE_TEXELS = 3 << 26
-"""Choices: texels of one image, and of all images. A texel takes 3 bytes, or 7 during decoding."""
+"""A choice: texels of all images of a scene."""
 
 FREE_TEXELS = 1 << 26
+"""A choice: texels that the images of a scene may have whatever the size of their files."""
+
 TEXELS_PER_BYTE = 64
-"""Choices: the images of a scene may have the free texels plus this many for each byte of image files.
+"""A choice: further texels that they may have for each byte of image files.
 
 A photograph has 2 to 10 texels per byte. A file that unpacks a kilobyte to a megabyte has hundreds.
 """

@@ -107,7 +107,7 @@ def test_missing_textures_and_libraries_are_said(tmp_path):
 def test_a_broken_texture_is_refused(tmp_path):
     (tmp_path / "a.mtl").write_text("newmtl a\nmap_Kd broken.png\n")
     (tmp_path / "broken.png").write_bytes(b"\x89PNG\r\n\x1a\n????")
-    with pytest.raises(InputError, match=r"scene\.obj: map_Kd 'broken\.png': image is"):
+    with pytest.raises(InputError, match=r"scene\.obj: map_Kd 'broken\.png': image must be one of PNG"):
         read_text(tmp_path, "mtllib a.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\n")
 
 

@@ -211,7 +211,7 @@ def test_arguments_out_of_range_are_refused(shapes, bad):
 
 
 def test_scalar_fallback_agrees_within_noise(shapes, tmp_path):
-    """Without LLVM, the same rays with the same randomisation are traced: results agree far below the noise."""
+    """Without LLVM, the same rays with the same randomisation are traced: results agree far below noise."""
     scene, view = shapes.box_room(), shapes.box_room_view((16, 12))
     arguments = {"seed": 3, "noise_target": 0.0, "max_samples": 32, "bounces": 2}
     base = reference_views(scene, (view,), **arguments)[0]

@@ -80,7 +80,7 @@ def prior_card(learnt: "LearntPrior", config: TunedConfig, left_out: dict[str, s
 
 
 def _ratio(learnt: "LearntPrior", of: str, against: str) -> np.ndarray:
-    """Ratio of two losses [scenes, counts, splits], with `FLOOR` added to both against the references' noise."""
+    """Ratio of two losses [scenes, counts, splits], with `FLOOR` added to both because of noise."""
     above = {name: np.maximum(learnt.losses[name][0], 0.0) + FLOOR for name in (of, against)}
     return above[of] / above[against]
 

@@ -58,8 +58,7 @@ def test_gradient_is_the_runtimes_own(gl_context, light, name, start):
 
 
 def test_tabulated_gradient_follows_the_full_gather(gl_context):
-    """The gradient of the loss through the table matches that of the full gather to 2 % of the largest
-    component.
+    """The loss gradient through the table matches the full gather's to 2 % of the largest component.
 
     The table errs by up to 0.1 % in the image.
     """

@@ -156,8 +156,7 @@ def test_finer_texels_lie_at_silhouettes_alone(gl_context):
 
 
 def test_refined_maps_are_nearly_maps_so_much_finer(gl_context):
-    """Maps of 24² texels, refined 2 times, have less than a third of the error of 24² alone, measured against
-    48².
+    """Maps of 24² texels, refined 2 times, have less than a third of the error of 24² alone, against 48².
 
     A fifth was measured. The remaining error is due to objects so small that no neighbouring texel hit them.
     """

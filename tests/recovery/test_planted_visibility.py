@@ -39,7 +39,7 @@ def drawn_by_the_runtime(gl_context, light: str, parameters: ArtistParameters) -
 
 
 def test_recovery(gl_context):
-    """β and σ are recovered within 5 %, the error of the overlap grid, from starts 40 and 200 times smaller."""
+    """β and σ are recovered within 5 %, the error of the grid, from starts 40 and 200 times smaller."""
     views = tuple(drawn_by_the_runtime(gl_context, light, PLANTED) for light in ("spot", "point"))
     start = replace(
         PLANTED,

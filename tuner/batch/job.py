@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from vpltune.tuner.scene_fit.fit_scene import FitOptions
 
 LONGEST_STEM = 60
-"""Characters of the scene's file name in the name of its output folder. A choice: file systems allow 255
-bytes."""
+"""Characters of the scene's file name in the name of its output folder. A choice."""
 
 
 def short_key(key: str) -> str:

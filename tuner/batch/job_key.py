@@ -22,8 +22,7 @@ from vpltune.tuner.batch.job import JobOptions
 from vpltune.tuner.batch.referred_files import referred_files
 
 KEY_VERSION = 2
-"""Increase it whenever a code change makes the same inputs give a different record. Old records are then
-ignored."""
+"""Increase it whenever a code change alters the record of the same inputs. Old records are then ignored."""
 SETTLED_SECONDS = 2.0
 """A digest is not cached if the file changed less than this before it was hashed: within the same tick of the
 clock it could change again without a new timestamp. A choice."""

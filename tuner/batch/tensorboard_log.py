@@ -1,5 +1,4 @@
-"""TensorBoard logs of a batch: the loss of each scene at every step, and its relMSE before and after the
-fit."""
+"""TensorBoard logs of a batch: the loss of each scene at every step, and relMSE before and after the fit."""
 
 import contextlib
 import datetime

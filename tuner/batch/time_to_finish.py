@@ -8,8 +8,7 @@ from typing import Any
 from vpltune.tuner.batch.job import Job
 
 FIRST_GUESS_SECONDS = 10.0
-"""Intercept of the line before any scene is done. A choice: the order of magnitude on one core at the default
-size of the views."""
+"""Intercept of the line before any scene is done. A choice: the order of magnitude on one core."""
 FIRST_GUESS_SECONDS_PER_MIB = 0.5
 """Slope of the line before any scene is done. A choice, like the intercept."""
 

@@ -14,8 +14,7 @@ from vpltune.renderer.scene.scene import Light
 from vpltune.renderer.scene.views import View
 
 TEXELS = 1024
-"""Texels along the side of a face, the runtime's default. With a coarser map the lights move by less than a
-texel."""
+"""Texels along the side of a face, the runtime's default. On a coarser map the move is below a texel."""
 
 
 def moved_by_a_texel(view: View, length_world: float) -> View:

@@ -21,8 +21,7 @@ from jaxtyping import Bool, Float, Float64
 from vpltune.tuner.metrics.relative_squared_error import DARK_SHARE
 
 WORST_SHARE = 0.001
-"""Share of the pixels, the worst ones, that the trimmed relMSE leaves out; rounded up to whole pixels. A
-choice."""
+"""Share of the pixels, the worst, that trimmed relMSE leaves out; rounded up to whole pixels. A choice."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +29,7 @@ class ViewMetrics:
     """The metrics of one view, or their mean over several views."""
 
     relmse: float
-    """mean((y − r)²/(r² + 0.01·mean(r)²)) over valid pixels and channels. Includes the noise of the
-    reference."""
+    """mean((y − r)²/(r² + 0.01·mean(r)²)) over valid pixels and channels; includes reference noise."""
     trimmed_relmse: float
     """relMSE without the worst `WORST_SHARE` of the pixels."""
     worst_share: float

@@ -1,11 +1,9 @@
-"""The loss of a captured view, tabulated over the parameters that a prior sets. A training step costs a
-lookup.
+"""The loss of a captured view, tabulated over the parameters that a prior sets: a training step is a lookup.
 
 Let y be the image at intensity 1. Then the loss Σ w (ky − a)(ky − b) is A k² − B k + C, where A = Σ w y²,
 B = Σ w y (a + b) and C = Σ w a b. Only A and B depend on the other parameters, and they do so smoothly. They
 are tabulated over α, β and σ with the surrogate (`tuner.surrogate.vpl_gather`,
-`tuner.surrogate.vpl_visibility`), and
-interpolated: cubic in α, linear in β and σ.
+`tuner.surrogate.vpl_visibility`) and interpolated: cubic in α, linear in β and σ.
 """
 
 from dataclasses import dataclass

@@ -1,5 +1,4 @@
-"""The card of a learnt prior: its training scenes, its error on unseen scenes, and the scenes where it is
-worst."""
+"""The card of a learnt prior: training scenes, error on unseen scenes, and the scenes where it is worst."""
 
 from typing import TYPE_CHECKING
 

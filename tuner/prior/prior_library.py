@@ -40,8 +40,7 @@ VIEW_SIZE = (64, 48)
 FITTED, HELD_OUT = 2, 2
 """Number of views of each scene; each has its own camera and light position. A choice."""
 NOISE_TARGET, MAX_SAMPLES = 3e-3, 1024
-"""Limits of the references, see `reference_views`. A choice: coarser than in a fit, since there are many
-scenes."""
+"""Limits of the references, see `reference_views`. A choice: coarser than the defaults there."""
 RSM_RESOLUTION = 512
 """Texels along the side of a face of the reflective shadow map. A choice."""
 

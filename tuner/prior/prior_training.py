@@ -32,8 +32,7 @@ STEPS = 300
 LEARNING_RATE = 0.02
 """Initial learning rate of the training. A choice."""
 REACH = np.array([0.06, 0.15, 0.2, 0.2], np.float32)
-"""Typical range of each of `AUTO_PARAMETERS` along its axis, the unit of the weights and of the pull. A
-choice."""
+"""Typical range of each of `AUTO_PARAMETERS` along its axis, the unit of weights and pull. A choice."""
 WEIGHT_DECAY = 0.03
 """Factor on the sum of the squared weights. A choice: it prevents overfitting to few scenes."""
 PULL = 0.01

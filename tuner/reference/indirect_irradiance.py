@@ -34,8 +34,7 @@ interrupts have to wait for the end of a kernel."""
 ROULETTE_DEPTH = 3
 """Russian roulette starts after this many bounces. A choice: it does not change the expectation."""
 ROULETTE_SURVIVAL = 0.95
-"""Upper limit on the survival probability, which is otherwise the largest component of the throughput. A
-choice."""
+"""Upper limit on the survival probability, else the throughput's largest component. A choice."""
 BOUNCE_LIMIT = 64
 """Every path ends here. A choice: it bounds the time in scenes that absorb nothing."""
 
@@ -192,8 +191,7 @@ class IndirectIrradiance:
         return y, self._lights.irradiance(y, alive & y.hit, balance)
 
     def _from_light_path(self, x: Surface, alive, chosen, u, v):
-        """Contribution to x (W/m²) of a path from a randomly chosen light, times the weight of the balance
-        heuristic."""
+        """Contribution to x (W/m²) of a path from a random light, times the balance heuristic's weight."""
         w = self._wavefront
         count = w.to_number(self._lights.count)
         light = w.to_index(w.minimum(w.floor(chosen * count), w.maximum(count - 1.0, 0.0)))

@@ -12,8 +12,7 @@ from vpltune.tuner.reference.reference_view import ReferenceView, noise_floor
 from vpltune.tuner.reference.variant import describe_variant
 
 FIRST_ROUND = 64
-"""Samples per pixel and half before the first noise estimate. Each later round doubles the total. A
-choice."""
+"""Samples per pixel and half before the first noise estimate; later rounds double the total. A choice."""
 
 Progress = Callable[[str, float], None]
 """Called with a view's name and the share of the work done, in [0, 1]."""

@@ -56,8 +56,7 @@ class MitsubaVariant:
 
 
 def describe_variant() -> MitsubaVariant:
-    """The variant that references are rendered with on this machine. This process does not load Mitsuba for
-    it.
+    """The variant that references are rendered with here. This process does not load Mitsuba to find out.
 
     Raises:
         InputError: VPLTUNE_MITSUBA_VARIANT is neither `llvm_ad_rgb` nor `scalar_rgb`.

@@ -1,5 +1,4 @@
-"""The page of a library: totals, the tuned scenes from worst to best, and the other scenes with the
-reason."""
+"""The page of a library: totals, tuned scenes from worst to best, and other scenes with the reason."""
 
 from dataclasses import dataclass, replace
 from statistics import median

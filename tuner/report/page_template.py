@@ -12,8 +12,7 @@ from markupsafe import Markup
 from vpltune.tuner.report import page_text
 
 MAXIMUM_PAGE_BYTES = 8_000_000
-"""Largest size of a page. A choice: it opens at once and can be mailed. A page says what it leaves out for
-it."""
+"""Largest size of a page. A choice: it opens at once and can be mailed. The page says what is left out."""
 
 
 def page_html(template: str, style: tuple[str, ...], script: str, **context: Any) -> str:

@@ -1,5 +1,4 @@
-"""Format values for a page. They come from files and may be anything; whatever is not a number becomes a
-dash."""
+"""Format values for a page. Values come from files; whatever is not a number becomes a dash."""
 
 import math
 from typing import Any

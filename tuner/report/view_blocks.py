@@ -1,5 +1,4 @@
-"""The images of a page: linear ones for its script, tone-mapped ones in case no script runs, and error
-maps."""
+"""The images of a page: linear for its script, tone-mapped for when no script runs, and error maps."""
 
 import base64
 import io

@@ -80,8 +80,7 @@ class CapturedView:
     def runtime_radiance(
         self, indirect_irradiance: Float32[np.ndarray, "height width 3"]
     ) -> Float32[np.ndarray, "height width 3"]:
-        """Radiance [W/(m²·sr)] from the runtime's albedo and direct light and the given indirect irradiance
-        [W/m²]."""
+        """Radiance [W/(m²·sr)] from the runtime's albedo and direct light and this indirect light [W/m²]."""
         return radiance(self.captured.albedo, self.captured.direct_irradiance, indirect_irradiance)
 
     def metrics(self, indirect_irradiance: Float32[np.ndarray, "height width 3"]) -> ViewMetrics:

@@ -20,8 +20,7 @@ def keep_compiled_functions() -> None:
 
 
 def drop_torn_entries(folder: Path) -> None:
-    """Delete entries that a killed process left half-written. JAX ignores such entries but never replaces
-    them.
+    """Delete entries that a killed process left half-written. JAX ignores them but never replaces them.
 
     JAX writes entries in place, compressed with zlib if Python has no Zstandard. Only zlib entries are
     checked.

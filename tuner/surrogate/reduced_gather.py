@@ -1,5 +1,4 @@
-"""The fit of a view as a small least-squares problem, with about as many rows as the tabulated gather has
-nodes.
+"""The fit of a view as a small least-squares problem, with about one row for each node of the gather's table.
 
 Let B be the tabulated gather at all receivers and channels, f the weights of its nodes, k the intensity, and
 m = (a + b)/2 the mean of the reference's halves. The loss of a view is

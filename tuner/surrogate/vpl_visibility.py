@@ -18,8 +18,7 @@ from vpltune.renderer.frame.visibility_map_layout import (
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
 
 CHUNK = 128
-"""Receivers in one chunk. A choice: with 1,024 VPLs, an array with one value for each pair takes half a
-MiB."""
+"""Receivers in one chunk. A choice: with 1,024 VPLs, one value for each pair takes half a MiB."""
 _PADDINGS = 4
 """The fine texels are padded in steps of 1/`_PADDINGS` of the number of coarse texels. A choice."""
 
@@ -150,8 +149,7 @@ def visibility_origin(vpls: VirtualPointLights) -> Float[Array, "vpls 3"]:
 def surface_overlap(
     receivers: Receivers, vpls: VirtualPointLights, texels: MapTexels
 ) -> Float[Array, "receivers vpls"]:
-    """Overlap between each receiver and the surface that each VPL sees in its direction, as a share of the
-    distance.
+    """Overlap of each receiver with the surface that each VPL sees towards it, as a share of the distance.
 
     The surface is the one that the map's nearest ray hit. The overlap is the smaller of two distances: from
     the end of that ray to the receiver's tangent plane (receiver plane depth bias, Isidoro 2006), and from

@@ -31,8 +31,7 @@ def make_job(tmp_path):
 
 @pytest.fixture
 def fits(monkeypatch):
-    """Replaces `fit_scene`. `scenes` lists the scenes that were fitted; `error`, `status` and `files` set the
-    result of the next fit."""
+    """Replaces `fit_scene`: `scenes` lists what was fitted; `error`, `status` and `files` set the result."""
     log = SimpleNamespace(scenes=[], error=None, status="improved", files={"tuned.json": "{}"})
 
     def fit_scene(scene_path, output, options, progress):

@@ -1,5 +1,4 @@
-"""One process at a time holds a claim. It is free once the process dies, or its host has sent no heartbeat
-for long."""
+"""One process at a time holds a claim; it lapses when the process dies or its host sends no heartbeat."""
 
 import contextlib
 import json

@@ -1,5 +1,4 @@
-"""The forecast is exact if all scenes are alike, an honest interval otherwise, and absent before three
-scenes."""
+"""The forecast is exact for scenes alike, an honest interval otherwise, and absent before three scenes."""
 
 import io
 

@@ -1,5 +1,4 @@
-"""A scene is tuned once: the record decides, the claim excludes other processes, partial output is
-replaced."""
+"""A scene is tuned once: the record decides, the claim excludes others, partial output is replaced."""
 
 import json
 from pathlib import Path

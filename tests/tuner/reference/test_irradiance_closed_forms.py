@@ -157,8 +157,7 @@ def ball(shapes, reflectance):
 
 @pytest.mark.parametrize(("bounces", "series"), [(1, 0.5), (2, 0.75), (None, 1.0)])
 def test_a_furnace_gives_the_geometric_series(shapes, bounces, series):
-    """Inside a sphere lit from its centre, E_direct = I everywhere. One bounce gives ρ·I, all give ρ/(1 −
-    ρ)·I.
+    """Inside a sphere lit from its centre, E_direct = I. One bounce gives ρ·I, all together ρ/(1 − ρ)·I.
 
     For ρ = 1/2 that is I/2 for one bounce, 3/4·I for two, and I for all.
     """

@@ -21,8 +21,7 @@ def nothing_remembered(monkeypatch, tmp_path):
 
 
 def probe_that(monkeypatch, works_on, *, aborts=True):
-    """Replaces the probe: it works with one library, and with others it aborts or hangs. Returns the list of
-    libraries tried."""
+    """Replaces the probe: it works with one library and aborts or hangs with others. Returns those tried."""
     tried = []
 
     def run(command, *, env, capture_output, timeout):

@@ -1,5 +1,4 @@
-"""The page of a fit in a real browser: images, slider, exposure, keyboard, print, dark mode, narrow screens,
-no script."""
+"""The page of a fit in a real browser: images, slider, exposure, keyboard, print, dark, narrow, no script."""
 
 import json
 

@@ -25,7 +25,7 @@ except ModuleNotFoundError as error:
     raise MachineError("--slurm: submitit is not installed; try: pip install 'vpltune[cluster]'") from error
 
 POLL_SECONDS = 2.0
-"""Interval between two looks at the tasks and records. A choice."""
+"""Interval between two checks of the tasks and records. A choice."""
 ENDING_SECONDS = 10.0
 """Time for the tasks to end by themselves once all scenes are done. A choice."""
 LEAST_MINUTES = 60

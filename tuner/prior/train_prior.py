@@ -73,7 +73,7 @@ def learn_prior(scenes: tuple[PriorScene, ...], progress: Progress) -> LearntPri
 def train_prior(
     library: Path | None, generated: int, seed: int, output: Path, command: str | None, progress: Progress
 ) -> dict[str, Any]:
-    """Train a prior on generated scenes and those of a library; write a config, and its card beside it as .md.
+    """Train a prior on generated scenes and those of a library. Write the config, and its card (.md) beside it.
 
     Captures and references are cached, so an interrupted run continues where it stopped. A scene that cannot
     be read, or with an unlit view, is left out and named in the result.

@@ -28,8 +28,8 @@ except ModuleNotFoundError as error:
 CONNECT_SECONDS = 120.0
 """Time for the Dask scheduler to answer, at the start and after a lost connection. A choice."""
 POLL_SECONDS = 0.2
-"""Interval between two checks of the submitted tasks, and pause before a scene that another run has claimed is
-tried again. A choice."""
+"""Interval between two checks of the submitted tasks, and pause before a scene that another run has claimed
+is tried again. A choice."""
 CREW_SECONDS = 5.0
 """Interval between two queries of the number of workers. A choice."""
 MOST_AT_ONCE = 4096

@@ -73,10 +73,11 @@ def learn_prior(scenes: tuple[PriorScene, ...], progress: Progress) -> LearntPri
 def train_prior(
     library: Path | None, generated: int, seed: int, output: Path, command: str | None, progress: Progress
 ) -> dict[str, Any]:
-    """Train a prior on generated scenes and those of a library. Write the config, and its card (.md) beside it.
+    """Train a prior on generated scenes and those of a library; write the config and its card.
 
-    Captures and references are cached, so an interrupted run continues where it stopped. A scene that cannot
-    be read, or with an unlit view, is left out and named in the result.
+    The card is a Markdown file beside the config. Captures and references are cached, so an interrupted run
+    continues where it stopped. A scene that cannot be read, or with an unlit view, is left out and named in
+    the result.
 
     Args:
         library: Folder or list of scenes; None for generated scenes only.

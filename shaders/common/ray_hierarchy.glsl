@@ -35,6 +35,7 @@ layout(std430, binding = RAY_INSTANCES_BINDING) readonly buffer RayInstances {
     RayInstance ray_instances[];
 };
 
+// The bits of `child` that hold a leaf's number of items.
 const uint RAY_COUNT_MASK = (1u << RAY_COUNT_BITS) - 1u;
 // Stack entries that are no nodes: the end of the traversal, and the way back to world space. Their low bits give a
 // number of items that no leaf has.

@@ -17,6 +17,7 @@ struct ReceiverSums {
     float light_squared;    // its square
 };
 
+// The neutral element of `added`.
 const ReceiverSums NO_RECEIVERS = ReceiverSums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
 
 layout(std430, binding = SCENE_STATISTICS_BINDING) buffer SceneStatistics {

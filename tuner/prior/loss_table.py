@@ -123,7 +123,7 @@ def table_loss(table: LossTable, point: Float[Array | np.ndarray, " parameters"]
 
 def table_residuals(
     table: LossTable, point: Float[Array | np.ndarray, " parameters"]
-) -> Float[Array, "residuals"]:
+) -> Float[Array, " residuals"]:
     """Two numbers whose squares sum to `table_loss`, or to 0 where that is negative; differentiable.
 
     A k² − B k + C = (√A k − B/(2√A))² + (C − B²/(4A)). The second term is the loss at the best intensity. It

@@ -43,6 +43,7 @@ FITTED, HELD_OUT = 2, 2
 NOISE_TARGET, MAX_SAMPLES = 3e-3, 1024
 """Limits of the references, see `reference_views`. A choice: coarser than the defaults there."""
 RSM_RESOLUTION = 512
+"""Texels along the side of a face of the reflective shadow map. A choice."""
 CONFIG = TunedConfig(visibility="maps", quality=Quality(rsm_resolution=RSM_RESOLUTION))
 """What scenes are captured with, at several VPL counts."""
 

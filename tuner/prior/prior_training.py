@@ -49,11 +49,12 @@ CAUTION = 3.0
 """Weight of the loss relative to the defaults against the loss relative to the fit. A choice: 1 comes
 slightly closer to the fits but is worse than the defaults on more scenes."""
 FLOOR = 0.01
-"""ε: below it, what differs between two losses is mostly the references' noise."""
+"""ε. A choice: below it, two losses differ mostly by the noise of the references."""
 FOLDS = 8
 """Groups of the cross-validation, which are trained in parallel. A choice."""
 
 DEFAULT = default_point(ArtistParameters())
+"""The point of the default parameters in the unit cube."""
 _SIZE = HIGHEST_POINT - LOWEST_POINT
 Weights = dict[str, Array]
 """`weights` [parameters, statistics] and `bias` [parameters], both in units of `REACH`."""
@@ -100,7 +101,7 @@ def own_fits(scenes: tuple[PriorScene, ...], held_out: bool = False) -> OwnFits:
 
 
 def _rows(scene: PriorScene, vpl_count: int, fitted: bool) -> LossTable:
-    """What the scene's own fit at that VPL count may see."""
+    """The tables of the fitted or the held-out views of a scene at one VPL count."""
     rows = (scene.fitted == fitted) & (scene.vpl_count == vpl_count)
     return jax.tree.map(lambda values: jnp.asarray(values[rows]), scene.table)
 
@@ -202,7 +203,7 @@ def _folded(weights: dict[str, np.ndarray], center: np.ndarray, spread: np.ndarr
 
 
 def _fitted_point(table: LossTable) -> Float32[np.ndarray, " parameters"]:
-    """The best of the descents from the defaults and from softer starts, over all rows of one scene."""
+    """The best of three descents over a scene's rows, from the defaults and from two shifted starts."""
     moves = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.15, 0.3, 0.1], [0.0, 0.0, -0.2, -0.3]])
     starts = np.clip((DEFAULT + moves - LOWEST_POINT) / _SIZE, 0.0, 1.0)
     found = [descend(_residuals, table, start) for start in starts]

@@ -33,7 +33,7 @@ class CapturedView:
     reference: ReferenceView
     captured: CapturedFrame
     drawn_with: TunedConfig | None = None
-    """The config that `captured` was drawn with, where it is known; a prior's parameters as it set them."""
+    """The config that `captured` was rendered with, a prior replaced by what it set; None if unknown."""
     statistics: Float32[np.ndarray, " statistics"] | None = None
     """The scene statistics of the view (`renderer.config.scene_statistics`); None if not measured."""
     valid: Bool[np.ndarray, "height width"] = field(init=False)
@@ -142,7 +142,7 @@ def capture_views(
     *,
     statistics: bool = False,
 ) -> tuple[CapturedView, ...]:
-    """Draw and read back every view with `config`; `statistics` measures those of its scene too."""
+    """Render every view and read back its buffers, with its scene statistics if `statistics` is true."""
     captured = []
     for view, reference in zip(views, references, strict=True):
         drawn = runtime.draw(view, config)
@@ -159,8 +159,10 @@ def runtime_irradiance(
     view: CapturedView,
     known: Sequence[CapturedView] = (),
 ) -> Float32[np.ndarray, "height width 3"]:
-    """The runtime's own indirect irradiance [W/m²] of a view with `config`, drawn unless `known` or `view`
-    holds it."""
+    """The indirect irradiance [W/m²] that the runtime renders for a view with `config`.
+
+    It is taken from `view` or `known` if one of them was rendered with the same settings.
+    """
     for each in (view, *known):
         if each.drawn_with is not None and each.drawn_with.draws_as(config) and each.view is view.view:
             return each.captured.indirect_irradiance

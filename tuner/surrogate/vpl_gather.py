@@ -201,11 +201,11 @@ def _weighted_flux(
     vpls: VirtualPointLights,
     visibility: Visibility | None,
 ) -> Float[Array, "receivers 3"]:
-    """The sum of the VPLs' flux at every receiver, weighed by what is made of `pair_forms`."""
+    """Σ weight · flux over the VPLs at each receiver; `weight_of` takes the results of `pair_forms`."""
     axes = vpl_axes(vpls)
 
-    # Made anew for its gradient: kept, all pairs of all chunks would be written out and read back, which took
-    # forty times as long and memory that grows with their number.
+    # Recompute the chunk for its gradient. Storing all pairs of all chunks would take memory in proportion to
+    # their number, and took forty times as long.
     @partial(jax.checkpoint, prevent_cse=False)
     def of_chunk(position: Array, normal: Array, visible: Array | None) -> Array:
         weight = weight_of(*pair_forms(Receivers(position, normal), vpls, axes))

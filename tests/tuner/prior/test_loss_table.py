@@ -65,7 +65,7 @@ def table(view) -> LossTable:
 
 
 def direct_loss(view: CapturedView, point: np.ndarray) -> float:
-    """By the gather itself, pair by pair."""
+    """The loss at a point of the unit cube, by the gather over all pairs."""
     values = {n: parameter_spec(n).within(float(p)) for n, p in zip(AUTO_PARAMETERS, point, strict=True)}
     parameters = replace(PARAMETERS, **values)
     pixels = view.fitted_pixels(RECEIVERS, 0)

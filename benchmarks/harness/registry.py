@@ -22,7 +22,7 @@ def run_benchmark(name: str, progress: Callable[[str, float], None]) -> list[Row
 
 
 def _modules() -> dict[str, str]:
-    """Map benchmark names to module names: the files of `FOLDERS` that define `rows`. Imports none of them."""
+    """Module names by benchmark name: the files of `FOLDERS` that define `rows`. Nothing is imported."""
     return {
         path.stem: f"benchmarks.{folder}.{path.stem}"
         for folder in FOLDERS

@@ -1,7 +1,7 @@
 """VPL placement, gather and the whole indirect path: interleaved against full, GPU against read-back.
 
-Milliseconds are medians of a few frames, pass by pass. A row that covers several passes is their sum. It is an
-upper bound, because passes overlap in a real frame.
+Milliseconds are medians of a few frames, pass by pass. A row that covers several passes is their sum. The sum
+is an upper bound, because passes overlap in a real frame.
 """
 
 import time

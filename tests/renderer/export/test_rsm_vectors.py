@@ -92,7 +92,8 @@ def placed(context, rsm, parameters: ArtistParameters, filtering=5, rotation=(0.
 
 
 def test_flux_and_length_of_the_scene(gl_context, rsm):
-    _, statistics = placed(gl_context, rsm, ArtistParameters(vpl_count=16))
+    """They do not depend on the density that VPLs are drawn with."""
+    _, statistics = placed(gl_context, rsm, ArtistParameters(vpl_count=16, density_exponent=0.5))
     assert statistics[1] == pytest.approx(RSM["total_flux"], rel=RTOL)
     assert statistics[2] == pytest.approx(RSM["scene_length"], rel=RTOL)
     assert statistics[3] == RSM["lit_texels"]

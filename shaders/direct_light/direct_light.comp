@@ -6,7 +6,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-layout(rgba32f, binding = 0) writeonly uniform image2D out_irradiance;
+layout(rgba32f, binding = IRRADIANCE_IMAGE) writeonly uniform image2D out_irradiance;
 
 uniform int light_count;
 uniform sampler2D light_accumulation;

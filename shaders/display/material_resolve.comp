@@ -6,7 +6,7 @@ uniform sampler2D direct_irradiance;
 uniform sampler2D indirect_irradiance;
 uniform vec2 share;  // of direct and of indirect light in the image
 
-layout(rgba32f, binding = 0) writeonly uniform image2D out_radiance;
+layout(rgba32f, binding = RADIANCE_IMAGE) writeonly uniform image2D out_radiance;
 
 const float PI = 3.14159265358979;
 

@@ -7,7 +7,7 @@ layout(std430, binding = EXPOSURE_BINDING) readonly buffer Exposure {
     float exposure;
 };
 
-layout(rgba8, binding = 0) writeonly uniform image2D out_display;
+layout(rgba8, binding = DISPLAY_IMAGE) writeonly uniform image2D out_display;
 
 #include "common/tone_curve.glsl"
 

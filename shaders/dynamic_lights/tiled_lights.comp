@@ -5,7 +5,7 @@
 
 layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
 
-layout(rgba16f, binding = 0) writeonly uniform image2D out_accumulation;
+layout(rgba16f, binding = ACCUMULATION_IMAGE) writeonly uniform image2D out_accumulation;
 
 uniform int cell_columns;
 uniform float accumulation_unit;

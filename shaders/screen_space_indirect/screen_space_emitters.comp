@@ -23,7 +23,7 @@ uniform float accumulation_unit;       // irradiance [W/m²] of a stored 1; 0 wh
 uniform int vpl_count;
 uniform int light_count;
 
-layout(rgba32f, binding = 0) writeonly uniform image2D out_emitters;  // radiosity [W/m²], l² [world units²]
+layout(rgba32f, binding = EMITTERS_IMAGE) writeonly uniform image2D out_emitters;  // radiosity [W/m²], l² [world units²]
 
 struct SeeingTexel {
     float area;        // on the surface

@@ -21,7 +21,7 @@ layout(std430, binding = VPL_FOOTPRINT_BINDING) readonly buffer VplFootprint {
     float mean_vpl_footprint;
 };
 
-layout(rgba32f, binding = 0) writeonly uniform image2D out_irradiance;
+layout(rgba32f, binding = IRRADIANCE_IMAGE) writeonly uniform image2D out_irradiance;
 
 const float PI = 3.14159265358979;
 const vec2 R2_STEP = vec2(R2_STEP_X, R2_STEP_Y);

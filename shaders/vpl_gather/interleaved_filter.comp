@@ -16,7 +16,7 @@ uniform sampler2D interleaved;
 uniform sampler2D direction;  // with RELIGHT: of the light, octahedral
 uniform sampler2D base;       // with ADD_BASE: added to the result
 
-layout(rgba32f, binding = 0) writeonly uniform image2D out_irradiance;
+layout(rgba32f, binding = IRRADIANCE_IMAGE) writeonly uniform image2D out_irradiance;
 
 const int REACH = INTERLEAVE / 2;
 const int TILE = 8 + 2 * REACH;

@@ -27,9 +27,9 @@ layout(std430, binding = VIRTUAL_POINT_LIGHTS_BINDING) readonly buffer VirtualPo
     VirtualPointLight virtual_point_lights[];
 };
 
-layout(rgba32f, binding = 0) writeonly uniform image2D out_irradiance;
+layout(rgba32f, binding = IRRADIANCE_IMAGE) writeonly uniform image2D out_irradiance;
 #if INTERLEAVE > 1
-layout(rg16, binding = 1) writeonly uniform image2D out_direction;  // octahedral
+layout(rg16, binding = DIRECTION_IMAGE) writeonly uniform image2D out_direction;  // octahedral
 #endif
 
 uniform int vpl_count;

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float, Float32
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
-from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS, place_of, value_at
+from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS
 from vpltune.tuner.metrics.relative_squared_error import Target, target_of
 from vpltune.tuner.metrics.robust_error import robust_error
 from vpltune.tuner.surrogate.captured_view import CapturedView
@@ -39,7 +39,7 @@ SOFTNESS_PLACES = tuple(np.linspace(0.0, 1.0, 7).tolist())
 _PLACES = (FOOTPRINT_PLACES, BIAS_PLACES, SOFTNESS_PLACES)
 _INTENSITY_SPEC = parameter_spec("intensity")
 LOWEST_POINT, HIGHEST_POINT = (
-    np.array([place_of(_INTENSITY_SPEC, intensity), *(places[end] for places in _PLACES)], np.float32)
+    np.array([_INTENSITY_SPEC.place_of(intensity), *(places[end] for places in _PLACES)], np.float32)
     for intensity, end in ((0.5, 0), (2.0, -1))
 )
 """The part of the unit cube that tables cover, with intensities from 1/2 to 2."""
@@ -66,16 +66,13 @@ def loss_table(
     With `robust`, pixels weigh as in the first step of a robust fit that begins with the captured image;
     else as in relMSE. A view in which no light arrives has a table of zeros.
     """
-    pixels = view.fitted_pixels(RECEIVERS, seed)
-    receivers, vpls = gather_inputs(view.captured, pixels)
-    flat = np.flatnonzero(view.captured.valid.ravel())[pixels]
-    reference, drawn = view.reference, view.captured.indirect_irradiance.reshape(-1, 3)[flat]
-    halves = [half.reshape(-1, 3)[flat] for half in (reference.irradiance_a, reference.irradiance_b)]
+    values = view.pixel_values(RECEIVERS, seed)
+    receivers, vpls = gather_inputs(view.captured, values.chosen)
     weight = None
     if robust:
-        direct = reference.direct_irradiance.reshape(-1, 3)[flat]
-        weight = robust_error((halves[0] + halves[1]) / 2.0, direct, drawn).weights(drawn)
-    target = target_of(*halves, weight)
+        mean = (values.half_a + values.half_b) / 2.0
+        weight = robust_error(mean, values.direct, values.drawn).weights(values.drawn)
+    target = target_of(values.half_a, values.half_b, weight)
     maps = view.captured.visibility_maps
     overlap = None if maps is None else surface_overlap(receivers, vpls, map_texels(maps))
     square, product = _sums(receivers, vpls, overlap, jnp.float32(parameters.extinction_coefficient), target)
@@ -93,7 +90,7 @@ def _sums(
 ) -> tuple[Array, Array]:
     """A and B at every node."""
     footprints, biases, softnesses = (
-        jnp.array([value_at(parameter_spec(name), place) for place in places], jnp.float32)
+        jnp.array([parameter_spec(name).value_at(place) for place in places], jnp.float32)
         for name, places in zip(AUTO_PARAMETERS[1:], _PLACES, strict=True)
     )
 
@@ -113,7 +110,36 @@ def _sums(
 
 def table_loss(table: LossTable, point: Float[Array | np.ndarray, " parameters"]) -> Float[Array, ""]:
     """The loss of one view at a point between `LOWEST_POINT` and `HIGHEST_POINT`; differentiable."""
-    point = jnp.asarray(point)
+    square, product = _interpolated(table, jnp.asarray(point))
+    intensity = _INTENSITY_SPEC.value_at(jnp.asarray(point)[0])
+    return intensity**2 * square - intensity * product + table.constant
+
+
+def table_residuals(
+    table: LossTable, point: Float[Array | np.ndarray, " parameters"]
+) -> Float[Array, "residuals"]:
+    """Two numbers whose squares sum to `table_loss`, or to 0 where that is negative; differentiable.
+
+    A k² − B k + C = (√A k − B/(2√A))² + (C − B²/(4A)). The second term is the loss at the best intensity. It
+    falls below zero only by the noise of the reference's halves.
+    """
+    square, product = _interpolated(table, jnp.asarray(point))
+    intensity = _INTENSITY_SPEC.value_at(jnp.asarray(point)[0])
+    # 1e-30: where no light arrives the table is zero, and so are both residuals.
+    root = jnp.sqrt(jnp.maximum(square, 1e-30))
+    least = table.constant - (product / (2.0 * root)) ** 2
+    # Below the noise the root has no slope, which keeps its gradient finite.
+    seen = least > 0.0
+    return jnp.stack(
+        [
+            root * intensity - product / (2.0 * root),
+            jnp.where(seen, jnp.sqrt(jnp.where(seen, least, 1.0)), 0.0),
+        ]
+    )
+
+
+def _interpolated(table: LossTable, point: Array) -> tuple[Array, Array]:
+    """A and B at a point."""
     starts, weights = zip(
         _cubic(point[1], FOOTPRINT_PLACES),
         _linear(point[2], BIAS_PLACES),
@@ -121,20 +147,17 @@ def table_loss(table: LossTable, point: Float[Array | np.ndarray, " parameters"]
         strict=True,
     )
 
-    def interpolated(values: Array) -> Array:
+    def at(values: Array) -> Array:
         near = jax.lax.dynamic_slice(values, starts, (4, 2, 2))
         return jnp.einsum("abc,a,b,c->", near, *weights, precision=jax.lax.Precision.HIGHEST)
 
-    intensity = _INTENSITY_SPEC.low * jnp.exp(point[0] * np.log(_INTENSITY_SPEC.high / _INTENSITY_SPEC.low))
-    return (
-        intensity**2 * interpolated(table.square) - intensity * interpolated(table.product) + table.constant
-    )
+    return at(table.square), at(table.product)
 
 
 def default_point(parameters: ArtistParameters) -> Float32[np.ndarray, " parameters"]:
     """Where `parameters` lie in the unit cube of `AUTO_PARAMETERS`."""
     given = parameters.as_dict()
-    return np.array([place_of(parameter_spec(name), given[name]) for name in AUTO_PARAMETERS], np.float32)
+    return np.array([parameter_spec(name).place_of(given[name]) for name in AUTO_PARAMETERS], np.float32)
 
 
 def _cubic(place: Array, nodes: tuple[float, ...]) -> tuple[Array, Float[Array, "4"]]:

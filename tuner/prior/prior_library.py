@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float32, Int32
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
 from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.scene_statistics import STATISTIC_NAMES
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.atomic_file import written_whole
@@ -40,6 +41,8 @@ FITTED, HELD_OUT = 2, 2
 """Views of each scene, each with a camera and a light position of its own."""
 NOISE_TARGET, MAX_SAMPLES = 3e-3, 1024
 RSM_RESOLUTION = 512
+CONFIG = TunedConfig(visibility="maps", quality=Quality(rsm_resolution=RSM_RESOLUTION))
+"""What scenes are captured with, at several VPL counts."""
 
 _ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.9, 0.4))
 ROTATIONS = {16: _ROTATIONS, 64: _ROTATIONS[:3], 256: _ROTATIONS[:2]}
@@ -116,14 +119,15 @@ def _captured(
     context: moderngl.Context, scene: Scene, views: tuple[View, ...], references: tuple[ReferenceView, ...]
 ) -> PriorScene:
     statistics, tables, relmse_tables, counts, fitted = [], [], [], [], []
+    runtime = Runtime(scene, context=context)
     for vpl_count, rotations in ROTATIONS.items():
         parameters = replace(ArtistParameters(), vpl_count=vpl_count)
-        config = TunedConfig(parameters, visibility="maps")
-        runtime = Runtime(scene, config, context=context, rsm_resolution=RSM_RESOLUTION)
+        config = replace(CONFIG, parameters=parameters)
         for view, reference in zip(views, references, strict=True):
             for rotation in rotations:
-                captured = CapturedView(view, reference, runtime.capture(view, rotation))
-                statistics.append(runtime.scene_statistics(view))
+                drawn = runtime.draw(view, config, table_rotation=rotation)
+                captured = CapturedView(view, reference, drawn.capture())
+                statistics.append(drawn.read_statistics())
                 tables.append(loss_table(captured, parameters, seed=0))
                 relmse_tables.append(loss_table(captured, parameters, seed=0, robust=False))
                 counts.append(vpl_count)
@@ -145,7 +149,7 @@ def _key(scene: Scene, views: tuple[View, ...]) -> str:
         "captures": [CAPTURE_VERSION, list(ROTATIONS.items()), NOISE_TARGET, MAX_SAMPLES, RSM_RESOLUTION],
         "statistics": STATISTIC_NAMES,
         "parameters": ArtistParameters().as_dict(),
-        "runtime": [asdict(DEFAULT_OPTIONS), VisibilityMapLayout.of(DEFAULT_OPTIONS).defines],
+        "runtime": [asdict(DEFAULT_OPTIONS), VisibilityMapLayout.of(CONFIG).defines],
         "axes": [[spec.low, spec.high, spec.scale] for spec in axes],
         "nodes": [FOOTPRINT_PLACES, BIAS_PLACES, SOFTNESS_PLACES, RECEIVERS],
     }

@@ -23,7 +23,15 @@ from jaxtyping import Array, Bool, Float, Float32, Int32
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.auto_prior import AutoPrior
-from vpltune.tuner.prior.loss_table import HIGHEST_POINT, LOWEST_POINT, LossTable, default_point, table_loss
+from vpltune.tuner.fitting.descent import descend
+from vpltune.tuner.prior.loss_table import (
+    HIGHEST_POINT,
+    LOWEST_POINT,
+    LossTable,
+    default_point,
+    table_loss,
+    table_residuals,
+)
 from vpltune.tuner.prior.prior_library import PriorScene
 
 STEPS = 300
@@ -39,11 +47,11 @@ CAUTION = 3.0
 closer to fits, and is worse than the defaults on more scenes."""
 FLOOR = 0.01
 """ε: below it, what differs between two losses is mostly the references' noise."""
-FIT_STEPS = 300
 FOLDS = 8
 """Trained at once, where scenes are left out in turn."""
 
 DEFAULT = default_point(ArtistParameters())
+_SIZE = HIGHEST_POINT - LOWEST_POINT
 Weights = dict[str, Array]
 """`weights` [parameters, statistics] and `bias` [parameters], both in units of `REACH`."""
 
@@ -81,18 +89,14 @@ def own_fits(scenes: tuple[PriorScene, ...], held_out: bool = False) -> OwnFits:
     `held_out` fits to the other views in their stead: what a fit of these could have come to.
     """
     counts = tuple(int(count) for count in np.unique(scenes[0].vpl_count))
-    points = [np.asarray(_fitted_points(_stacked(scenes, count, not held_out))) for count in counts]
-    return OwnFits(counts, np.stack(points, axis=1))
+    points = [[_fitted_point(_rows(scene, count, not held_out)) for count in counts] for scene in scenes]
+    return OwnFits(counts, np.array(points))
 
 
-def _stacked(scenes: tuple[PriorScene, ...], vpl_count: int, fitted: bool) -> LossTable:
-    """[scenes, rows, …]: what each scene's fit at that VPL count may see."""
-    rows = [(scene.fitted == fitted) & (scene.vpl_count == vpl_count) for scene in scenes]
-    tables = [
-        jax.tree.map(lambda values, r=r: values[r], scene.table)
-        for scene, r in zip(scenes, rows, strict=True)
-    ]
-    return jax.tree.map(lambda *parts: np.stack(parts), *tables)
+def _rows(scene: PriorScene, vpl_count: int, fitted: bool) -> LossTable:
+    """What the scene's own fit at that VPL count may see."""
+    rows = (scene.fitted == fitted) & (scene.vpl_count == vpl_count)
+    return jax.tree.map(lambda values: jnp.asarray(values[rows]), scene.table)
 
 
 def _joined(tables: Iterable[LossTable]) -> LossTable:
@@ -191,41 +195,20 @@ def _folded(weights: dict[str, np.ndarray], center: np.ndarray, spread: np.ndarr
     return AutoPrior(rows(*slopes), *rows(bias, LOWEST_POINT, HIGHEST_POINT))
 
 
-@jax.jit
-def _fitted_points(tables: LossTable) -> Float[Array, "scenes parameters"]:
-    return jax.lax.map(_fitted_point, tables, batch_size=16)
+def _fitted_point(table: LossTable) -> Float32[np.ndarray, " parameters"]:
+    """The best of the descents from the defaults and from softer starts, over all rows of one scene."""
+    moves = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.15, 0.3, 0.1], [0.0, 0.0, -0.2, -0.3]])
+    starts = np.clip((DEFAULT + moves - LOWEST_POINT) / _SIZE, 0.0, 1.0)
+    found = [descend(_residuals, table, start) for start in starts]
+    # `descend` is never worse than its start, so a fit is never worse than the defaults.
+    best = min(found, key=lambda descent: descent.loss)
+    return (LOWEST_POINT + best.point * _SIZE).astype(np.float32)
 
 
-def _fitted_point(table: LossTable) -> Float[Array, " parameters"]:
-    """The best of the descents from the defaults and from softer starts."""
-    moves = jnp.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.15, 0.3, 0.1], [0.0, 0.0, -0.2, -0.3]])
-    starts = jnp.clip(DEFAULT + moves, LOWEST_POINT, HIGHEST_POINT)
-    optimizer = optax.adam(optax.cosine_decay_schedule(0.02, FIT_STEPS))
-
-    def loss(point: Array) -> Array:
-        return jax.vmap(table_loss, in_axes=(0, None))(table, point).mean()
-
-    def descended(start: Array) -> tuple[Array, Array]:
-        def step(carry: tuple[Any, ...], _: None) -> tuple[Any, None]:
-            point, state, best, least = carry
-            value, gradient = jax.value_and_grad(loss)(point)
-            best, least = jnp.where(value < least, point, best), jnp.minimum(value, least)
-            updates, state = optimizer.update(gradient, state)
-            return (
-                jnp.clip(optax.apply_updates(point, updates), LOWEST_POINT, HIGHEST_POINT),
-                state,
-                best,
-                least,
-            ), None
-
-        first = (start, optimizer.init(start), start, jnp.inf)
-        (_, _, best, least), _ = jax.lax.scan(step, first, None, length=FIT_STEPS)
-        return best, least
-
-    # The defaults themselves, too: a fit is never worse than its start.
-    points, losses = jax.vmap(descended)(starts)
-    points, losses = jnp.concatenate([points, DEFAULT[None]]), jnp.append(losses, loss(jnp.asarray(DEFAULT)))
-    return points[jnp.argmin(losses)]
+def _residuals(place: Float[Array, " parameters"], table: LossTable) -> Float[Array, "rows residuals"]:
+    """At `place` in the unit cube of the tabulated part."""
+    rows = jax.vmap(table_residuals, in_axes=(0, None))(table, LOWEST_POINT + place * _SIZE)
+    return rows / np.sqrt(rows.shape[0])
 
 
 @jax.jit

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Bool, Float32
+from jaxtyping import Bool, Float32, Int
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import CapturedFrame
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.views import View
@@ -32,8 +32,8 @@ class CapturedView:
     view: View
     reference: ReferenceView
     captured: CapturedFrame
-    drawn_with: ArtistParameters | None = None
-    """The parameters that `captured` was drawn with, where they are known."""
+    drawn_with: TunedConfig | None = None
+    """The config that `captured` was drawn with, where it is known; a prior's parameters as it set them."""
     statistics: Float32[np.ndarray, " statistics"] | None = None
     """What `renderer.config.scene_statistics` measures of it, where that was asked for."""
     valid: Bool[np.ndarray, "height width"] = field(init=False)
@@ -73,6 +73,20 @@ class CapturedView:
             return usable
         return np.sort(np.random.default_rng(seed).choice(usable, count, replace=False))
 
+    def pixel_values(self, limit: int, seed: int) -> "PixelValues":
+        """What is known at the pixels of `fitted_pixels`."""
+        chosen = self.fitted_pixels(limit, seed)
+        flat = np.flatnonzero(self.captured.valid.ravel())[chosen]
+        reference = self.reference
+        images = (
+            reference.irradiance,
+            reference.direct_irradiance,
+            self.captured.indirect_irradiance,
+            reference.irradiance_a,
+            reference.irradiance_b,
+        )
+        return PixelValues(chosen, flat, *(image.reshape(-1, 3)[flat] for image in images))
+
     def reference_radiance(self) -> Float32[np.ndarray, "height width 3"]:
         """Direct plus indirect radiance of the reference, W/(m² sr)."""
         reference = self.reference
@@ -103,32 +117,53 @@ class CapturedView:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class PixelValues:
+    """Irradiance [W/m²] at some pixels of a view: the reference's and the runtime's."""
+
+    chosen: Int[np.ndarray, " pixels"]
+    """Indices into the captured frame's valid pixels."""
+    flat: Int[np.ndarray, " pixels"]
+    """Indices into the image, row by row."""
+    reference: Float32[np.ndarray, "pixels 3"]
+    """Indirect irradiance of the reference."""
+    direct: Float32[np.ndarray, "pixels 3"]
+    """Direct irradiance of the reference."""
+    drawn: Float32[np.ndarray, "pixels 3"]
+    """Indirect irradiance of the image that the view was captured with."""
+    half_a: Float32[np.ndarray, "pixels 3"]
+    half_b: Float32[np.ndarray, "pixels 3"]
+    """The reference's two independent halves."""
+
+
 def capture_views(
     runtime: Runtime,
+    config: TunedConfig,
     views: tuple[View, ...],
     references: tuple[ReferenceView, ...],
     *,
     statistics: bool = False,
 ) -> tuple[CapturedView, ...]:
-    """Draw and read back every view; `statistics` measures those of its scene too."""
+    """Draw and read back every view with `config`; `statistics` measures those of its scene too."""
     captured = []
     for view, reference in zip(views, references, strict=True):
-        frame = runtime.capture(view)
-        measured = runtime.scene_statistics(view) if statistics else None
-        captured.append(CapturedView(view, reference, frame, runtime.drawn_parameters(), measured))
+        drawn = runtime.draw(view, config)
+        frame = drawn.capture()
+        measured = drawn.read_statistics() if statistics else None
+        drawn_with = config.with_parameters(drawn.read_parameters())
+        captured.append(CapturedView(view, reference, frame, drawn_with, measured))
     return tuple(captured)
 
 
 def runtime_irradiance(
     runtime: Runtime,
-    parameters: ArtistParameters,
+    config: TunedConfig,
     view: CapturedView,
     known: Sequence[CapturedView] = (),
 ) -> Float32[np.ndarray, "height width 3"]:
-    """The runtime's own indirect irradiance of a view with `parameters`, drawn unless it is in `known` or
-    `view`."""
+    """The runtime's own indirect irradiance [W/m²] of a view with `config`, drawn unless `known` or `view`
+    holds it."""
     for each in (view, *known):
-        if each.drawn_with == parameters and each.view is view.view:
+        if each.drawn_with is not None and each.drawn_with.draws_as(config) and each.view is view.view:
             return each.captured.indirect_irradiance
-    runtime.parameters = parameters
-    return runtime.render(view.view, "irradiance")
+    return runtime.render(view.view, config, layer="irradiance")

@@ -19,8 +19,9 @@ from jaxtyping import Array, Bool, Float
 from scipy.interpolate import CubicSpline
 
 from vpltune.renderer.config.artist_parameters import parameter_spec
+from vpltune.tuner.surrogate.receiver_chunks import map_receivers
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
-from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, pair_forms, receivers_at_once, vpl_axes
+from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, pair_forms, vpl_axes
 from vpltune.tuner.surrogate.wide_vectors import wide_jit
 
 Visibility = Bool[np.ndarray, "receivers vpls"] | Float[Array, "receivers vpls"]
@@ -53,20 +54,8 @@ def tabulate_gather(
         receivers, vpls: in units of L.
         visibility: share of each VPL's light that reaches each receiver; None for all of it.
     """
-    count = receivers.position.shape[0]
-    chunk_size = receivers_at_once(vpls.position.shape[0], PAIRS_AT_ONCE)
-    padding = ((0, -count % chunk_size), (0, 0))
-
-    def chunked(values: np.ndarray | Array) -> Array:
-        return jnp.pad(jnp.asarray(values), padding).reshape(-1, chunk_size, values.shape[1])
-
-    images = _gather_chunks(
-        chunked(receivers.position),
-        chunked(receivers.normal),
-        None if visibility is None else chunked(visibility),
-        vpls,
-    )
-    return TabulatedGather(images.reshape(-1, *images.shape[2:])[:count])
+    arrays = (receivers.position, receivers.normal, visibility)
+    return TabulatedGather(_images(*(None if each is None else jnp.asarray(each) for each in arrays), vpls))
 
 
 def gather_tabulated(table: TabulatedGather, parameters: FalloffParameters) -> Float[Array, "receivers 3"]:
@@ -116,22 +105,22 @@ def _spline_weights(place: Array, count: int) -> Float[Array, " nodes"]:
 
 
 @wide_jit
-def _gather_chunks(
+def _images(
     position: Array, normal: Array, visibility: Array | None, vpls: VirtualPointLights
-) -> Float[Array, "chunks chunk 3 nodes"]:
+) -> Float[Array, "receivers 3 nodes"]:
     axes = vpl_axes(vpls)
 
-    def gather_chunk(chunk: tuple[Array, Array, Array | None]) -> Array:
-        squared, form_at = pair_forms(Receivers(chunk[0], chunk[1]), vpls, axes)
+    def of_chunk(position: Array, normal: Array, visible: Array | None) -> Array:
+        squared, form_at = pair_forms(Receivers(position, normal), vpls, axes)
         distance = jnp.sqrt(squared)
         forms = jnp.stack([form_at(jnp.asarray(alpha)) for alpha in _footprint_nodes()], axis=1)
         arriving = jnp.stack([jnp.exp(-kappa * distance) for kappa in _transmittance_nodes()], axis=2)
-        if chunk[2] is not None:
-            arriving = arriving * chunk[2][:, :, None]
+        if visible is not None:
+            arriving = arriving * visible[:, :, None]
         arriving = arriving[:, :, None, :] * (vpls.flux / jnp.pi)[None, :, :, None]
         arriving = arriving.reshape(*arriving.shape[:2], -1)
         images = jnp.matmul(forms, arriving, precision=jax.lax.Precision.HIGHEST)
         images = images.reshape(-1, FOOTPRINT_NODES, 3, TRANSMITTANCE_NODES)
         return images.transpose(0, 2, 1, 3).reshape(-1, 3, FOOTPRINT_NODES * TRANSMITTANCE_NODES)
 
-    return jax.lax.map(gather_chunk, (position, normal, visibility))
+    return map_receivers(of_chunk, (position, normal, visibility), vpls.position.shape[0], PAIRS_AT_ONCE)

@@ -17,6 +17,7 @@ from jaxtyping import Array, Bool, Float
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.frame.vpl_disc_bounds import LEAST_RADIUS
+from vpltune.tuner.surrogate.receiver_chunks import map_receivers
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
 from vpltune.tuner.surrogate.vpl_disc import disc_form
 
@@ -120,11 +121,6 @@ def pair_forms(
     return squared, lambda falloff_footprint: cosines / (squared + (falloff_footprint * vpls.footprint) ** 2)
 
 
-def receivers_at_once(vpls: int, pairs: int) -> int:
-    """How many receivers' pairs with all VPLs are about `pairs`: a power of two, at least 1."""
-    return 2 ** max((pairs // max(vpls, 1)).bit_length() - 1, 0)
-
-
 def gather(
     receivers: Receivers,
     vpls: VirtualPointLights,
@@ -196,27 +192,16 @@ def _weighted_flux(
     visibility: Visibility | None,
 ) -> Float[Array, "receivers 3"]:
     """The sum of the VPLs' flux at every receiver, weighed by what is made of `pair_forms`."""
-    count = receivers.position.shape[0]
-    chunk_size = min(receivers_at_once(vpls.position.shape[0], PAIRS_AT_ONCE), max(count, 1))
-    padding = ((0, -count % chunk_size), (0, 0))
     axes = vpl_axes(vpls)
-
-    def chunked(values: Array) -> Array:
-        return jnp.pad(values, padding).reshape(-1, chunk_size, values.shape[1])
 
     # Made anew for its gradient: kept, all pairs of all chunks would be written out and read back, which took
     # forty times as long and memory that grows with their number.
     @partial(jax.checkpoint, prevent_cse=False)
-    def of_chunk(chunk: tuple[Array, Array, Array | None]) -> Array:
-        position, normal, visible = chunk
+    def of_chunk(position: Array, normal: Array, visible: Array | None) -> Array:
         weight = weight_of(*pair_forms(Receivers(position, normal), vpls, axes))
         if visible is not None:
             weight = weight * visible
         return jnp.matmul(weight, vpls.flux, precision=jax.lax.Precision.HIGHEST)
 
-    inputs = (
-        chunked(receivers.position),
-        chunked(receivers.normal),
-        None if visibility is None else chunked(visibility),
-    )
-    return jax.lax.map(of_chunk, inputs).reshape(-1, 3)[:count]
+    arrays = (receivers.position, receivers.normal, visibility)
+    return map_receivers(of_chunk, arrays, vpls.position.shape[0], PAIRS_AT_ONCE)

@@ -9,7 +9,7 @@ import pytest
 from built_scenes import colored_room, room_view
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
-from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS, value_at
+from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.metrics.relative_squared_error import target_of, weighted_squared_error
@@ -66,7 +66,7 @@ def table(view) -> LossTable:
 
 def direct_loss(view: CapturedView, point: np.ndarray) -> float:
     """By the gather itself, pair by pair."""
-    values = {n: value_at(parameter_spec(n), float(p)) for n, p in zip(AUTO_PARAMETERS, point, strict=True)}
+    values = {n: parameter_spec(n).within(float(p)) for n, p in zip(AUTO_PARAMETERS, point, strict=True)}
     parameters = replace(PARAMETERS, **values)
     pixels = view.fitted_pixels(RECEIVERS, 0)
     receivers, vpls = gather_inputs(view.captured, pixels)

@@ -1,17 +1,20 @@
 """Runs a function of our shaders on rows of numbers, one row an invocation, and reads its results back."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import moderngl
 import numpy as np
 
-from vpltune.renderer.gpu.shader_library import Define, read_shader
+from vpltune.renderer.gpu.resources import Resource
+from vpltune.renderer.gpu.shader_library import Define, read_shader, set_uniforms
 
 _GROUP = 64
-# Past the bindings that shaders use themselves.
+# Past the bindings that are given out below.
 _INPUTS, _RESULTS = 40, 41
 _INCLUDE = re.compile(r'^#include "([^"]+)"$', re.MULTILINE)
+_BINDING = re.compile(r"binding = (\w+)_BINDING\b")
+_SAMPLER = re.compile(r"\buniform\s+sampler2D\s+(\w+)")
 
 
 def glsl_results(
@@ -21,21 +24,24 @@ def glsl_results(
     body: str,
     inputs: np.ndarray,
     result_width: int,
-    prepare: Callable[[moderngl.ComputeShader], object] | None = None,
+    resources: Mapping[str, Resource] | None = None,
+    **uniforms: object,
 ) -> np.ndarray:
     """[rows, result_width] float32: `body` reads `inputs[first + i]` and writes `results[to + i]`.
 
     Args:
         includes: files of shaders/ in their order, or lines of GLSL between them.
         inputs: [rows, width]; one invocation for each row.
-        prepare: sets the program's uniforms.
+        resources: buffers and textures by the names that the shaders give them.
     """
     rows, width = inputs.shape
-    constants = "".join(f"#define {name} {value}\n" for name, value in defines.items())
+    text = _joined(includes)
+    places = {name: place for place, name in enumerate(dict.fromkeys(_BINDING.findall(text)))}
+    constants = {**defines, **{f"{name}_BINDING": place for name, place in places.items()}}
     program = context.compute_shader(
         f"""#version 450 core
-{constants}
-{_joined(includes)}
+{"".join(f"#define {name} {value}{chr(10)}" for name, value in constants.items())}
+{text}
 layout(local_size_x = {_GROUP}) in;
 layout(std430, binding = {_INPUTS}) readonly buffer Inputs {{ float inputs[]; }};
 layout(std430, binding = {_RESULTS}) writeonly buffer Results {{ float results[]; }};
@@ -56,8 +62,14 @@ void main() {{
     found = context.buffer(reserve=4 * rows * result_width)
     given.bind_to_storage_buffer(_INPUTS)
     found.bind_to_storage_buffer(_RESULTS)
-    if prepare is not None:
-        prepare(program)
+    units = {name: unit for unit, name in enumerate(dict.fromkeys(_SAMPLER.findall(text)))}
+    for name, resource in (resources or {}).items():
+        if isinstance(resource, moderngl.Buffer):
+            resource.bind_to_storage_buffer(places[name.upper()])
+        else:
+            resource.use(units[name])
+    set_uniforms(program, **units, **uniforms)
+    context.memory_barrier()
     program.run(-(-rows // _GROUP))
     context.memory_barrier()
     return np.frombuffer(found.read(), np.float32).reshape(rows, result_width)

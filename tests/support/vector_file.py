@@ -8,14 +8,18 @@ import moderngl
 import numpy as np
 from built_scenes import quad, scene_of
 
-from vpltune.renderer.gpu import buffer_bindings
-from vpltune.renderer.scene.light_faces import light_records
-from vpltune.renderer.scene.scene import Light, Scene
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.frame.frame_pass import FrameInputs
+from vpltune.renderer.gpu.camera_uniforms import camera_uniforms
+from vpltune.renderer.scene.light_faces import LightRecords, light_records
+from vpltune.renderer.scene.scene import Camera, Light, Scene
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 VECTORS: dict[str, Any] = json.loads((REPOSITORY / "docs" / "test_vectors.json").read_text(encoding="utf-8"))
 BOUNDS = np.array(VECTORS["faces"][0]["bounds"], np.float64)
 """Of the boxes."""
+DIAGONAL = float(np.linalg.norm(BOUNDS[1] - BOUNDS[0]))
+PI = "const float PI = 3.14159265358979;"
 
 
 def boxes() -> Scene:
@@ -28,7 +32,7 @@ def boxes() -> Scene:
             u, v = edges[(axis + 1) % 3], edges[(axis + 2) % 3]
             meshes.append(quad(low, v, u, index))
             meshes.append(quad(low + edges[axis], u, v, index))
-    return scene_of(meshes, [box["reflectance"] for box in VECTORS["boxes"]])
+    return scene_of(meshes, [tuple(box["reflectance"]) for box in VECTORS["boxes"]])
 
 
 def light_of(document: dict[str, Any]) -> Light:
@@ -39,21 +43,28 @@ def light_of(document: dict[str, Any]) -> Light:
     return Light(document["type"], np.array(document["intensity"]), **placed, **cones)
 
 
-def bind_light(context: moderngl.Context, light: Light) -> None:
-    """Make `light` the only one, with its faces for the scene of boxes."""
-    records = light_records((light,), BOUNDS)
-    for values, binding in (
-        (records.lights, buffer_bindings.LIGHTS),
-        (records.faces, buffer_bindings.RSM_FACES),
-    ):
-        context.buffer(np.ascontiguousarray(values).tobytes()).bind_to_storage_buffer(binding)
+def records_of(light: Light) -> LightRecords:
+    """One light and its faces, for the scene of boxes."""
+    return light_records((light,), BOUNDS)
 
 
-def buffer_of(context: moderngl.Context, values: np.ndarray, binding: int) -> moderngl.Buffer:
-    """A buffer that holds `values`, bound; it lives as long as someone holds it."""
-    buffer = context.buffer(np.ascontiguousarray(values).tobytes())
-    buffer.bind_to_storage_buffer(binding)
-    return buffer
+def light_buffers(context: moderngl.Context, light: Light) -> dict[str, moderngl.Buffer]:
+    """The light and its faces as shaders read them."""
+    records = records_of(light)
+    return {"lights": buffer_of(context, records.lights), "rsm_faces": buffer_of(context, records.faces)}
+
+
+def inputs_of(
+    light: Light, parameters: ArtistParameters, table_rotation: tuple[float, float] = (0.0, 0.0)
+) -> FrameInputs:
+    """What passes are given that look at no camera."""
+    camera = camera_uniforms(Camera(np.eye(4), 1.0), (8, 8), BOUNDS)
+    return FrameInputs(camera, records_of(light), parameters, DIAGONAL, table_rotation)
+
+
+def buffer_of(context: moderngl.Context, values: np.ndarray) -> moderngl.Buffer:
+    """A buffer that holds `values`."""
+    return context.buffer(np.ascontiguousarray(values).tobytes())
 
 
 def vpl_rows(vpls: dict[str, Any]) -> np.ndarray:
@@ -65,8 +76,9 @@ def vpl_rows(vpls: dict[str, Any]) -> np.ndarray:
     return rows
 
 
-def assert_same_vpls(rows: np.ndarray, expected: dict[str, Any], rtol: float) -> None:
-    """VPLs as shaders have them against those of the file; lengths to `rtol` of the scene's few units."""
+def assert_same_vpls(content: bytes, expected: dict[str, Any], rtol: float) -> None:
+    """A buffer of VPLs against those of the file; lengths to `rtol` of the scene's few units."""
+    rows = np.frombuffer(content, np.float32).reshape(-1, 12)
     np.testing.assert_allclose(rows[:, 0:3], expected["position"], atol=3.0 * rtol)
     np.testing.assert_allclose(rows[:, 4:7], expected["normal"], atol=1e-4)
     np.testing.assert_allclose(rows[:, 3], expected["footprint"], rtol=rtol)

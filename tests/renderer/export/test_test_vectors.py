@@ -9,16 +9,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from glsl_results import glsl_results
-from vector_file import BOUNDS, REPOSITORY, VECTORS, bind_light, light_of
+from vector_file import BOUNDS, DIAGONAL, PI, REPOSITORY, VECTORS, light_buffers, light_of
 
 from vpltune.renderer.frame import vpl_disc_bounds
 from vpltune.renderer.frame.point_table import r2_sequence
-from vpltune.renderer.gpu import buffer_bindings
 from vpltune.renderer.scene.light_faces import FaceSnapping, light_records
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
 from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, gather
 
-PI = "const float PI = 3.14159265358979;"
 CONSTANTS = ("intensity", "falloff_footprint", "extinction_coefficient")
 
 
@@ -59,7 +57,7 @@ def test_point_table():
     "case", VECTORS["faces"], ids=lambda case: f"{len(case['faces'])}-{case['light']['type']}"
 )
 def test_faces_of_lights(case):
-    snapping = FaceSnapping(float(np.linalg.norm(BOUNDS[1] - BOUNDS[0])), case["resolution"])
+    snapping = FaceSnapping(DIAGONAL, case["resolution"])
     records = light_records((light_of(case["light"]),), BOUNDS, snapping).faces
     assert len(records) == len(case["faces"])
     for record, face in zip(records, case["faces"], strict=True):
@@ -72,14 +70,14 @@ def test_faces_of_lights(case):
 @pytest.mark.parametrize("case", VECTORS["lights"], ids=lambda case: case["light"]["type"])
 def test_irradiance_square_to_a_light(gl_context, case):
     """To 1e-4 of it: single precision near a cone's rim."""
-    bind_light(gl_context, light_of(case["light"]))
     found = glsl_results(
         gl_context,
         ["common/lights.glsl"],
-        buffer_bindings.DEFINES,
+        {},
         "result3(to, irradiance_facing(lights[0], input3(first)));",
         np.array(case["position"]),
         3,
+        light_buffers(gl_context, light_of(case["light"])),
     )
     np.testing.assert_allclose(found, case["irradiance_facing"], rtol=1e-4, atol=1e-6)
 

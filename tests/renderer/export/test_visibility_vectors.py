@@ -4,14 +4,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from glsl_results import glsl_results
-from vector_file import VECTORS, boxes, buffer_of, vpl_rows
+from vector_file import PI, VECTORS, boxes, buffer_of, inputs_of, light_of, vpl_rows
 
+from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.frame.capture import octahedral_decode
+from vpltune.renderer.frame.passes.vpl_visibility_maps import VplVisibilityMapsPass
 from vpltune.renderer.frame.visibility_map_layout import VisibilityMapLayout
-from vpltune.renderer.gpu import buffer_bindings
-from vpltune.renderer.gpu.ray_hierarchy import RAY_DEFINES, RayHierarchy
+from vpltune.renderer.gpu.ray_hierarchy import RayHierarchy
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
-from vpltune.renderer.gpu.shader_library import load_compute, set_uniforms
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
 from vpltune.tuner.surrogate.vpl_visibility import (
     MapTexels,
@@ -25,12 +25,9 @@ CASE = VECTORS["visibility"]
 MAP = {name: np.array(values) for name, values in CASE["map"].items()}
 SIZE, REFINEMENT = len(MAP["end"]), MAP["block_end"].shape[1]
 LENGTH = CASE["scene_length"]
-LOOKUP = [
-    "const float PI = 3.14159265358979;",
-    "common/virtual_point_lights.glsl",
-    "common/vpl_visibility.glsl",
-]
-DEFINES = {**buffer_bindings.DEFINES, **VisibilityMapLayout(SIZE, REFINEMENT).defines}
+LOOKUP = [PI, "common/virtual_point_lights.glsl", "common/vpl_visibility.glsl"]
+LAYOUT = VisibilityMapLayout(SIZE, REFINEMENT)
+DEFINES = LAYOUT.defines
 VPL = {name: [CASE["vpl"][name]] for name in ("position", "normal", "footprint")} | {
     "flux": [[1.0, 1.0, 1.0]]
 }
@@ -115,14 +112,12 @@ def test_shaders_see_this(gl_context, pair):
     blocks = MAP["block"].ravel()
     texels[blocks >= 0, 0] = 0x80000000
     texels[blocks >= 0, 1] = blocks[blocks >= 0]
-    kept = [
-        buffer_of(gl_context, texels, buffer_bindings.VISIBILITY_MAPS),
-        buffer_of(
-            gl_context,
-            packed(gl_context, MAP["block_end"], MAP["block_normal"]),
-            buffer_bindings.VISIBILITY_DETAILS,
+    maps = {
+        "visibility_maps": buffer_of(gl_context, texels),
+        "visibility_details": buffer_of(
+            gl_context, packed(gl_context, MAP["block_end"], MAP["block_normal"])
         ),
-    ]
+    }
     numbers = {name: ", ".join(map(str, np.ravel(values))) for name, values in VPL.items()}
     found = glsl_results(
         gl_context,
@@ -136,8 +131,8 @@ def test_shaders_see_this(gl_context, pair):
         """,
         np.array([case["position"] + case["normal"] for case in CASE["receivers"]]),
         1,
+        maps,
     )
-    assert len(kept) == 2
     np.testing.assert_allclose(
         found[:, 0], [case["seen_share"][pair] for case in CASE["receivers"]], atol=2e-3
     )
@@ -176,38 +171,21 @@ def test_the_surrogate_sees_this(pair):
 
 def test_maps_are_cast_like_this(gl_context):
     """Distances to 1e-4, normals to 16 bits, and the same texels at silhouettes with the same finer rays."""
-    layout = VisibilityMapLayout(SIZE, REFINEMENT)
-    defines = {**RAY_DEFINES, **layout.defines, "VISIBILITY_BLOCKS": SIZE**2}
-    scene = boxes()
-    hierarchy = RayHierarchy(gl_context, scene, SceneBuffers(gl_context, scene))
-    hierarchy.update()
-    hierarchy.bind()
-    maps = buffer_of(gl_context, np.zeros((SIZE**2, 2), np.uint32), buffer_bindings.VISIBILITY_MAPS)
-    details = buffer_of(
-        gl_context, np.zeros((SIZE**2 * REFINEMENT**2, 2), np.uint32), buffer_bindings.VISIBILITY_DETAILS
-    )
-    kept = [
-        buffer_of(gl_context, vpl_rows(VPL), buffer_bindings.VIRTUAL_POINT_LIGHTS),
-        buffer_of(gl_context, np.float32([1.0, 1.0, LENGTH, 1.0]), buffer_bindings.FRAME_STATISTICS),
-    ]
-    edges = buffer_of(
-        gl_context, np.array([0, 1, 1, 0, *[0] * SIZE**2], np.uint32), buffer_bindings.VISIBILITY_EDGES
-    )
-    for name in ("maps", "edges", "details"):
-        program = load_compute(gl_context, f"vpl_visibility_maps/vpl_visibility_{name}", defines)
-        set_uniforms(program, longest=CASE["diagonal"], vpl_count=1)
-        if name == "details":
-            program.run_indirect(edges)
-        else:
-            program.run(1)
-        gl_context.memory_barrier()
-    assert kept
-    texels = np.frombuffer(maps.read(), np.uint32).reshape(SIZE, SIZE, 2)
+    scene = SceneBuffers(gl_context, boxes())
+    hierarchy = RayHierarchy(gl_context, boxes(), scene)
+    resources = scene.resources()
+    hierarchy.add_to(resources)
+    resources["virtual_point_lights"] = buffer_of(gl_context, vpl_rows(VPL))
+    resources["frame_statistics"] = buffer_of(gl_context, np.float32([1.0, 1.0, LENGTH, 1.0]))
+    light = light_of(VECTORS["rsm"]["light"])
+    VplVisibilityMapsPass(resources, 1, LAYOUT, hierarchy).draw(inputs_of(light, ArtistParameters()))
+    texels = np.frombuffer(resources.read("visibility_maps"), np.uint32).reshape(SIZE, SIZE, 2)
     refined = texels[..., 0] >> 31 != 0
     np.testing.assert_array_equal(refined, MAP["block"] >= 0)
     assert_met(texels[~refined], MAP["end"][~refined], MAP["normal"][~refined])
     # Blocks lie in the order in which invocations came to them.
-    blocks = np.frombuffer(details.read(), np.uint32).reshape(-1, REFINEMENT, REFINEMENT, 2)
+    details = resources.read("visibility_details")
+    blocks = np.frombuffer(details, np.uint32).reshape(-1, REFINEMENT, REFINEMENT, 2)
     assert_met(blocks[texels[refined][:, 1]], MAP["block_end"], MAP["block_normal"])
 
 

@@ -1,4 +1,4 @@
-"""An image by `examples/formulas` alone is the runtime's: docs/runtime_formulas.md, one step after another."""
+"""An image by `examples/formulas` alone is the runtime's: docs/runtime_formulas.md step by step."""
 
 import dataclasses
 
@@ -166,7 +166,7 @@ def drawn_by_formulas(config: TunedConfig, captured) -> np.ndarray:
     ids=["points", "discs", "importance"],
 )
 def test_an_image_by_formulas_is_the_runtimes(gl_context, parameters, visibility):
-    """To 2e-3 relative RMSE: reflectances are half floats in the runtime, and normals have 16 bits a channel."""
+    """To 2e-3 relative RMSE: reflectances are half floats in the runtime, normals have 16 bits a channel."""
     config = TunedConfig(
         parameters,
         visibility=visibility,

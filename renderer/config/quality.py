@@ -115,8 +115,8 @@ class Quality:
         for name, spec in cls.__dataclass_fields__.items():
             object.__setattr__(unchecked, name, members.get(name, spec.default))
         unchecked.check(where)
-        members["adaptation_frames"] = float(unchecked.adaptation_frames)
-        return cls(**members)
+        # As a float: programs write a whole one as 15 or as 15.0, and a checksum is of values.
+        return cls(**{**members, "adaptation_frames": float(unchecked.adaptation_frames)})
 
 
 def quality_schema(lloyd_iterations: dict[str, Any]) -> dict[str, Any]:

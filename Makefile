@@ -31,10 +31,11 @@ test-all: setup $(TEST_STAMP) ## every test, the slow ones too
 bench: setup ## the benchmarks
 	@$(BIN)/vpltune bench all
 
-lint: setup ## style, format and import rules
+lint: setup ## style, format, import rules, docstrings and comments
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
 	@$(BIN)/lint-imports --no-logo
+	@$(BIN)/python scripts/check_words.py
 
 requirements: setup ## pin every Python package anew, with hashes
 	@$(BIN)/python -m pip install -q pip-tools

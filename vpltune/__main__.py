@@ -26,6 +26,7 @@ from vpltune.cli.import_scene import import_scene
 from vpltune.cli.render import render
 from vpltune.cli.report import (
     BAD_INPUT,
+    DEFECT,
     INTERRUPTED,
     MACHINE_LACKS,
     Report,
@@ -39,7 +40,6 @@ from vpltune.cli.train_prior import train_prior
 from vpltune.renderer.errors import InputError, MachineError
 
 PROGRAM = "vpltune"
-DEFECT = 1
 
 app = typer.Typer(
     name=PROGRAM,

@@ -41,7 +41,7 @@ struct RayHit {
     uint instance;
 };
 
-const uint RAY_NO_TRIANGLE = 0xFFFFFFFFu;
+const uint RAY_NO_TRIANGLE = 0xFFFFFFFFu; // not the index of a triangle
 
 // What the unit direction meets first; nothing farther than `longest`, which is then the distance.
 RayHit ray_hit(vec3 origin_world, vec3 direction_world, float longest) {

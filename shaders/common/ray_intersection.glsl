@@ -1,6 +1,6 @@
 // A ray against a box and against a triangle.
 
-const float RAY_MISS = 3.4e38;
+const float RAY_MISS = 3.4e38; // beyond every distance; close to the largest float
 
 struct RayTriangle {  // in the mesh's own space
     vec3 a;

@@ -18,7 +18,7 @@ layout(std430, binding = VISIBILITY_DETAILS_BINDING) buffer VisibilityDetails {
     visibility_details[(int(block) * VISIBILITY_MAP_REFINEMENT + inside.y) * VISIBILITY_MAP_REFINEMENT + inside.x]
 #endif
 
-const uint VISIBILITY_BLOCK_BIT = 0x80000000u;
+const uint VISIBILITY_BLOCK_BIT = 0x80000000u; // in an entry of a map: the rest is the index of a refined block
 // What meets nothing ends so many diagonals of the scene away, at a wall that faces the VPL: no receiver is behind it.
 const float VISIBILITY_NOTHING = 2.0;
 // What meets something ends nearer than so many.

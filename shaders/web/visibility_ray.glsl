@@ -12,7 +12,7 @@ uniform int vpl_count;
 uniform float longest;
 
 const uint RAY_COUNT_MASK = (1u << RAY_COUNT_BITS) - 1u;
-const uint RAY_DONE = 0xFFFFFFFFu;
+const uint RAY_DONE = 0xFFFFFFFFu; // neither a node nor a triangle
 
 ivec2 data_texel(uint index) {
     return ivec2(int(index) % DATA_COLUMNS, int(index) / DATA_COLUMNS);

@@ -48,11 +48,13 @@ class LineDisplay:
         self._forecast = forecast
 
     def found(self, jobs: "Sequence[Job]", already_done: int) -> None:
+        """Told once, before anything starts: the scenes to tune, and how many have a record."""
         self._forecast.found(jobs)
         known = f", {already_done} have a record" if already_done else ""
         _say(f"{len(jobs)} scene{'s' * (len(jobs) != 1)} to tune{known}")
 
     def happened(self, event: dict[str, Any]) -> None:
+        """Told of each event of the batch's log."""
         self._forecast.happened(event, time.monotonic())
         line = ending(event)
         if line and event["event"] == "record":
@@ -71,12 +73,14 @@ class BarDisplay:
         self._scenes: dict[str, Any] = {}
 
     def found(self, jobs: "Sequence[Job]", already_done: int) -> None:
+        """Told once, before anything starts: the scenes to tune, and how many have a record."""
         self._forecast.found(jobs)
         self._already_done = already_done
         self._whole = self._bars.add_task("scenes", total=len(jobs) + already_done, note="")
         self._bars.update(self._whole, completed=already_done)
 
     def happened(self, event: dict[str, Any]) -> None:
+        """Told of each event of the batch's log."""
         self._forecast.happened(event, time.monotonic())
         key = event.get("key", "")
         if event["event"] == "scene_started":

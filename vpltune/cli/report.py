@@ -9,7 +9,9 @@ from typing import Any
 
 from vpltune.renderer.files.strict_json import strict_json
 
+# Exit codes. DEFECT: an error that the program does not foresee.
 OK = 0
+DEFECT = 1
 BAD_INPUT = 2
 MACHINE_LACKS = 3
 PARTLY_DONE = 4

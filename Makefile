@@ -37,9 +37,10 @@ lint: setup ## style, format, import rules, docstrings and comments
 	@$(BIN)/lint-imports --no-logo
 	@$(BIN)/python scripts/check_words.py
 
-requirements: setup ## pin every Python package anew, with hashes
+# Keeps the pins there are; UPGRADE=1 takes the newest releases.
+requirements: setup ## pin Python packages, with hashes; with UPGRADE=1 anew
 	@$(BIN)/python -m pip install -q pip-tools
-	@$(BIN)/pip-compile -q --upgrade --generate-hashes --extra dev --all-build-deps --strip-extras \
+	@$(BIN)/pip-compile -q $(if $(UPGRADE),--upgrade) --generate-hashes --extra dev --all-build-deps --strip-extras \
 	    --no-header --no-annotate --no-emit-options --no-emit-index-url --no-emit-trusted-host \
 	    --no-emit-find-links -o requirements.txt pyproject.toml
 

@@ -15,6 +15,7 @@ from vpltune.cli.options import (
     checked_scale,
 )
 from vpltune.cli.report import Report, warn
+from vpltune.cli.verbosity import detail
 from vpltune.cli.view_options import (
     ImageSizeOption,
     ViewFlags,
@@ -147,6 +148,7 @@ def render(
         adaptation_frames=0.0 if frames is None else fps / 4.0,
     )
     runtime = Runtime(loaded, tuned, options, rsm_resolution=rsm_resolution)
+    detail(f"OpenGL on {runtime.opengl_renderer}")
     bouncing = _bouncing_lights(loaded, drawn, dynamic_lights)
     if frames is None:
         _write_layer(runtime, drawn, layer, output, bouncing)

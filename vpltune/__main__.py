@@ -71,10 +71,11 @@ for name, command in COMMANDS.items():
     app.command(name, hidden=absent)(any_command(command, name))
 
 
-def _print_version(wanted: bool) -> None:
+def _print_version(wanted: bool) -> bool:
     if wanted:
         print(f"{PROGRAM} {_version(PROGRAM)}")
         raise typer.Exit
+    return wanted
 
 
 @app.callback()

@@ -1,6 +1,7 @@
-"""The probes of `vpltune doctor`: `python -m vpltune.tuner.doctor.machine_probes NAME` prints one finding as JSON.
+"""The probes of `vpltune doctor`.
 
-Run by `tuner.doctor.machine_findings`, each in a process of its own.
+`python -m vpltune.tuner.doctor.machine_probes NAME` prints one finding as JSON. Each probe is run by
+`tuner.doctor.machine_findings` in a process of its own.
 """
 
 import ctypes
@@ -11,6 +12,7 @@ import shutil
 import sys
 from collections.abc import Callable, Mapping
 
+from vpltune.tuner.doctor.extras import EXTRA_MODULES, how_to_install, missing_modules
 from vpltune.tuner.doctor.machine_findings import APT_LLVM, APT_OPENGL, PIP
 
 Said = Mapping[str, str]
@@ -63,6 +65,19 @@ def probe_opengl() -> Said:
             "detail": detail,
             "fallback": "Mesa draws on the processor: the same images, more slowly",
         }
+    return {"state": "ok", "detail": detail}
+
+
+def probe_extras() -> Said:
+    """The extras that are installed. Without `tuner` there is the runtime alone."""
+    missing = {extra: modules for extra in EXTRA_MODULES if (modules := missing_modules(extra))}
+    parts = {
+        "installed": [extra for extra in EXTRA_MODULES if extra not in missing],
+        "not installed": [f"{extra} (no {', '.join(modules)})" for extra, modules in missing.items()],
+    }
+    detail = "; ".join(f"{part}: {', '.join(names)}" for part, names in parts.items() if names)
+    if "tuner" in missing:
+        return {"state": "missing", "detail": detail, "mend": how_to_install("tuner")}
     return {"state": "ok", "detail": detail}
 
 
@@ -137,6 +152,7 @@ PROBE_FUNCTIONS: Mapping[str, Callable[[], Said]] = {
     "python": probe_python,
     "egl": probe_egl,
     "opengl": probe_opengl,
+    "extras": probe_extras,
     "jax": probe_jax,
     "llvm": probe_llvm,
     "mitsuba": probe_mitsuba,

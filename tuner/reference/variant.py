@@ -14,6 +14,7 @@ import functools
 import hashlib
 import importlib.metadata
 import json
+import logging
 import os
 import platform
 import re
@@ -26,6 +27,8 @@ from typing import Literal
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.tuner.reference.cache import cache_folder, locked
+
+_log = logging.getLogger(__name__)
 
 LIBRARIES_TRIED = 4
 PROBE_SECONDS = 60.0
@@ -70,6 +73,7 @@ def select_variant() -> MitsubaVariant:
 
     if mitsuba.variant() != variant.name:
         mitsuba.set_variant(variant.name)
+        _log.debug("%s", variant.sentence)
         threads = os.environ.get("VPLTUNE_THREADS", "")
         if threads.isdecimal() and int(threads) > 0:
             import drjit

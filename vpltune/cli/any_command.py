@@ -12,7 +12,7 @@ from vpltune.cli.verbosity import choose_verbosity
 from vpltune.renderer.errors import MachineError
 
 QuietOption = Annotated[
-    bool, typer.Option("-q", "--quiet", help="Print errors alone on stderr: no progress and no notes.")
+    bool, typer.Option("-q", "--quiet", help="Print only errors on stderr: no progress, no notes.")
 ]
 VerboseOption = Annotated[
     bool, typer.Option("-v", "--verbose", help="Print times, versions, drivers and tracebacks on stderr.")

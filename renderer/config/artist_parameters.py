@@ -78,6 +78,22 @@ class ParameterSpec:
             raise InputError(f"{where}.{self.name}: must be a whole number, got {value!r:.60}")
         return int(value)
 
+    def value_at(self, place: Any) -> Any:
+        """The value at `place` in [0, 1] along the axis; for numbers, NumPy and JAX arrays alike."""
+        if self.scale == "log":
+            return self.low * (self.high / self.low) ** place
+        return self.low + place * (self.high - self.low)
+
+    def within(self, place: float) -> float:
+        """`value_at`, clamped to the range: rounding may step over a bound, and readers are strict."""
+        return float(min(max(self.value_at(place), self.low), self.high))
+
+    def place_of(self, value: float) -> float:
+        """Where along the axis, in [0, 1], the parameter has `value`."""
+        if self.scale == "log":
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
 
 ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
     ParameterSpec(
@@ -95,7 +111,7 @@ ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
         name="falloff_footprint",
         symbol="α",
         # 1 is exact facing a disc, 0 in the edge of a corner. Between them, 0.5 keeps the energy within
-        # 1 % from 1,024 VPLs on and is within a tenth of the least error (benchmarks/quality/falloff_default.py).
+        # 1 % from 1,024 VPLs on and is within a tenth of the least error (`vpltune bench falloff_default`).
         default=0.5,
         low=0.05,
         high=20.0,
@@ -180,7 +196,7 @@ ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
         scale="linear",
         unit="iterations",
         meaning=(
-            "Lloyd iterations that cluster the VPLs: 0 draws them as points, more makes each a clustered disc "
+            "Lloyd iterations that cluster the VPLs: 0 draws them as points, else each is a clustered disc "
             "light; more than 4,096 VPLs are always points"
         ),
         part="quality",
@@ -212,6 +228,9 @@ ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
         fitted=False,
     ),
 )
+
+LARGEST_DISC_COUNT = 4096
+"""Most VPLs that are clustered: every RSM sample looks at every VPL. More are drawn as points."""
 
 _SPECS = {spec.name: spec for spec in ARTIST_PARAMETERS}
 
@@ -259,6 +278,11 @@ class ArtistParameters:
             if name not in values:
                 raise InputError(f"{where}: key '{name}' is missing")
         return cls(**{name: spec.checked(values[name], where) for name, spec in _SPECS.items()})
+
+    @property
+    def vpls_are_discs(self) -> bool:
+        """Whether VPLs are clustered disc lights; else they are points."""
+        return self.lloyd_iterations > 0 and self.vpl_count <= LARGEST_DISC_COUNT
 
     def as_dict(self) -> dict[str, float | int]:
         """The values by name, in the table's order."""

@@ -11,9 +11,13 @@ from typing import Any
 from vpltune.renderer.errors import InputError
 
 INTERLEAVES = (1, 2, 4, 8)
+"""Sides of a block. A choice: 8² pixels are one workgroup of the gather."""
 MAP_REFINEMENTS = (1, 2, 4, 8)
+"""Rays along the side of a refined texel. A choice."""
 SMALLEST_MAP, LARGEST_MAP = 4, 64
+"""Texels along the side of a map. The largest map fills the 32 KiB of shared memory that every driver has."""
 SMALLEST_RSM, LARGEST_RSM = 64, 8192
+"""Texels along the side of a face. A choice: six faces of the largest need 2 GiB."""
 LONGEST_ADAPTATION = 1e4
 """Frames: nearly three minutes at 60 frames per second, far beyond any use."""
 LARGEST_SIDE = 16384
@@ -21,7 +25,7 @@ LARGEST_SIDE = 16384
 
 
 @dataclass(frozen=True)
-class FrameBudget:
+class MetBudget:
     """The frame-time budget that the settings were chosen for, and where they were measured to meet it."""
 
     milliseconds: float
@@ -58,7 +62,7 @@ class Quality:
     """Time constant, in frames, at which a clip's parameters follow the prior of an `auto` config: a quarter
     of a second at 60 frames per second. 0 follows at once. A still always does."""
 
-    budget: FrameBudget | None = None
+    budget: MetBudget | None = None
 
     def __post_init__(self) -> None:
         self.check("quality")
@@ -151,7 +155,7 @@ def quality_schema(lloyd_iterations: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _budget(values: Any, where: str) -> FrameBudget:
+def _budget(values: Any, where: str) -> MetBudget:
     names = ("milliseconds", "frame_size", "machine")
     members = _members(values, names, where)
     for name in names:
@@ -167,7 +171,7 @@ def _budget(values: Any, where: str) -> FrameBudget:
         _whole(side, 1, LARGEST_SIDE, f"{where}.frame_size")
     if not isinstance(machine, str):
         raise InputError(f"{where}.machine: must be a string, got {machine!r:.60}")
-    return FrameBudget(float(milliseconds), (size[0], size[1]), machine)
+    return MetBudget(float(milliseconds), (size[0], size[1]), machine)
 
 
 def _members(values: Any, known: tuple[str, ...], where: str) -> dict[str, Any]:

@@ -37,6 +37,7 @@ from vpltune.renderer.files.strict_json import DuplicateKeyError, unique_keys
 
 FORMAT = "vpltune"
 VERSION = 2
+"""Version that is written; version 1 is read too."""
 DEFAULT_CONFIG_NAME = "default"
 AUTO_CONFIG_NAME = "auto"
 PRESETS = (DEFAULT_CONFIG_NAME, AUTO_CONFIG_NAME)
@@ -44,8 +45,17 @@ PRESETS = (DEFAULT_CONFIG_NAME, AUTO_CONFIG_NAME)
 MAXIMUM_FILE_BYTES = 1 << 20
 LARGEST_NUMBER = sys.float_info.max
 KEYS = (
-    "format", "version", "visibility", "quality", "parameters", "auto", "light", "fit", "provenance", "checksum"
-)  # fmt: skip
+    "format",
+    "version",
+    "visibility",
+    "quality",
+    "parameters",
+    "auto",
+    "light",
+    "fit",
+    "provenance",
+    "checksum",
+)
 
 Visibility = Literal["transmittance", "maps"]
 VISIBILITIES: tuple[Visibility, ...] = get_args(Visibility)
@@ -97,6 +107,19 @@ class TunedConfig:
     def with_parameters(self, parameters: ArtistParameters) -> "TunedConfig":
         """The same config with these parameters, which replace its prior too."""
         return replace(self, parameters=parameters, auto=None)
+
+    def draws_as(self, other: "TunedConfig") -> bool:
+        """Whether both draw the same images."""
+        return (self.parameters, self.visibility, self.auto, self.quality) == (
+            other.parameters,
+            other.visibility,
+            other.auto,
+            other.quality,
+        )
+
+    def with_full_gather(self) -> "TunedConfig":
+        """The same config with every VPL gathered at every pixel, which is what the surrogate computes."""
+        return replace(self, quality=replace(self.quality, interleave=1))
 
 
 def read_config(source: str | Path, *, check: bool = True) -> TunedConfig:

@@ -5,13 +5,15 @@ from typing import Literal, get_args
 
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters, ParameterSpec
 from vpltune.renderer.config.parameter_block import BLOCK_BYTES, BLOCK_FIELDS, pack_parameters
-from vpltune.renderer.config.tuned_config import VISIBILITIES, TunedConfig, config_text
+from vpltune.renderer.config.tuned_config import TunedConfig, Visibility, config_text
 from vpltune.renderer.errors import InputError
 
 ExportFormat = Literal["json", "glsl", "c", "std140"]
 EXPORT_FORMATS: tuple[ExportFormat, ...] = get_args(ExportFormat)
 
-_VISIBILITY_CODES = ", ".join(f"{code} {name}" for code, name in enumerate(VISIBILITIES))
+VISIBILITY_CODES: dict[Visibility, int] = {"transmittance": 1, "maps": 2}
+"""VPL_VISIBILITY in exported constants; 0 was a mode that is no more."""
+_VISIBILITY_TEXT = ", ".join(f"{code} {name}" for name, code in VISIBILITY_CODES.items())
 
 
 def exported(config: TunedConfig, export_format: ExportFormat) -> bytes:
@@ -66,7 +68,9 @@ def glsl_constants(config: TunedConfig) -> str:
         f"const {_glsl_type(spec)} {constant_name(spec)} = {values[spec.name]!r}; // {spec.unit}"
         for spec in ARTIST_PARAMETERS
     ]
-    lines += ["#endif", f"const int VPL_VISIBILITY = {_visibility_code(config)}; // {_VISIBILITY_CODES}"]
+    visibility = VISIBILITY_CODES[config.visibility]
+    lines += ["#endif", f"const int VPL_VISIBILITY = {visibility}; // {_VISIBILITY_TEXT}"]
+    lines += [f"const int {name} = {value};" for name, value in _quality_constants(config).items()]
     return "\n".join(lines) + "\n"
 
 
@@ -97,7 +101,8 @@ def c_header(config: TunedConfig) -> str:
             "#define VPLTUNE_PARAMETERS_H",
             "#include <stdint.h>",
             *macros,
-            f"#define VPL_VISIBILITY {_visibility_code(config)} /* {_VISIBILITY_CODES} */",
+            f"#define VPL_VISIBILITY {VISIBILITY_CODES[config.visibility]} /* {_VISIBILITY_TEXT} */",
+            *(f"#define {name} {value}" for name, value in _quality_constants(config).items()),
             "/* Byte for byte the std140 uniform block of `vpltune export --to std140`. */",
             "struct vpl_parameters {",
             *members,
@@ -125,5 +130,12 @@ def _glsl_type(spec: ParameterSpec) -> str:
     return "int" if spec.whole_number else "float"
 
 
-def _visibility_code(config: TunedConfig) -> int:
-    return VISIBILITIES.index(config.visibility)
+def _quality_constants(config: TunedConfig) -> dict[str, int]:
+    """The quality settings that another engine can follow; 0 texels leave the resolution to it."""
+    quality = config.quality
+    return {
+        "VPL_INTERLEAVE": quality.interleave,
+        "VPL_MAP_SIZE": quality.map_size,
+        "VPL_MAP_REFINEMENT": quality.map_refinement,
+        "VPL_RSM_RESOLUTION": quality.rsm_resolution or 0,
+    }

@@ -15,13 +15,13 @@ import numpy as np
 from vpltune.renderer.config.tuned_config import TunedConfig, config_text
 from vpltune.renderer.files.atomic_file import written_whole
 from vpltune.renderer.frame import vpl_disc_bounds
+from vpltune.renderer.frame.disc_samples import NORMAL_REACH, sample_count
 from vpltune.renderer.frame.passes import vpl_importance
-from vpltune.renderer.frame.passes.clustered_discs import LARGEST_COUNT, NORMAL_REACH, sample_count
 from vpltune.renderer.frame.passes.tone_mapping import EXPOSURE_KEY
 from vpltune.renderer.frame.point_table import R2_STEPS
-from vpltune.renderer.frame.runtime import FEW_FACES, RSM_RESOLUTION, RSM_RESOLUTION_OF_MANY
+from vpltune.renderer.frame.rsm_resolution import rsm_resolution
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
-from vpltune.renderer.frame.visibility_map_layout import NO_MAPS, VisibilityMapLayout
+from vpltune.renderer.frame.visibility_map_layout import VisibilityMapLayout
 from vpltune.renderer.gpu.camera_uniforms import camera_uniforms
 from vpltune.renderer.gpu.render_targets import MAX_ATLAS_COLUMNS
 from vpltune.renderer.scene.animation import AnimationPlayer
@@ -32,6 +32,7 @@ from vpltune.renderer.scene.views import View, light_to_json
 
 FORMAT = "vpltune-bundle"
 VERSION = 1
+"""Version of the bundle that is written."""
 # What triangles without a texture look up.
 WHITE = Texture("white", np.full((1, 1, 3), 255, np.uint8))
 DOCUMENT_NAME, BINARY_NAME = "bundle.json", "bundle.bin"
@@ -45,10 +46,8 @@ class SceneBundle:
     binary: bytes
 
 
-def scene_bundle(
-    scene: Scene, view: View, config: TunedConfig, *, rsm_resolution: int | None = None
-) -> SceneBundle:
-    """The bundle of a scene at rest, for the runtime with its default options and the same `rsm_resolution`.
+def scene_bundle(scene: Scene, view: View, config: TunedConfig) -> SceneBundle:
+    """The bundle of a scene at rest, for the runtime with its default options.
 
     Raises:
         InputError: the config holds a value that is out of range.
@@ -58,13 +57,12 @@ def scene_bundle(
     binary = _Binary()
     draws = _draws(scene, binary)
     count = len(light_records(view.lights, bounds).faces)
-    resolution = rsm_resolution or (RSM_RESOLUTION if count <= FEW_FACES else RSM_RESOLUTION_OF_MANY)
+    resolution = rsm_resolution(view.lights, config.quality)
     snapping = FaceSnapping(float(np.linalg.norm(bounds[1] - bounds[0])), resolution)
     records = light_records(view.lights, bounds, snapping)
     _add_light_records(view, records, resolution, binary)
     columns, rows = _atlas(records)
     uniforms = camera_uniforms(view.camera, view.size, bounds)
-    options = RuntimeOptions()
     document = {
         "format": FORMAT,
         "version": VERSION,
@@ -83,14 +81,14 @@ def scene_bundle(
         "rsm": {
             "resolution": resolution,
             "atlas": [resolution * rows, resolution * columns],
-            "filtering": options.rsm_filtering,
+            "filtering": RuntimeOptions().rsm_filtering,
             "moment_origin": list(records.moment_origin),
             "faces": _faces(records, resolution),
         },
         "point_table": {"kind": "r2", "steps": list(R2_STEPS)},
         "vpl_importance": _vpl_importance(config, count),
         "clustered_discs": _clustered_discs(config),
-        "visibility_maps": _visibility_maps(options, config),
+        "visibility_maps": _visibility_maps(config),
         "draws": draws,
         "textures": [_texture(texture, binary) for texture in (*scene.textures, WHITE)],
         "arrays": binary.arrays,
@@ -109,14 +107,10 @@ def _vpl_importance(config: TunedConfig, face_count: int) -> dict[str, Any]:
     }
 
 
-def _vpls_are_discs(config: TunedConfig) -> bool:
-    return config.parameters.lloyd_iterations > 0 and config.parameters.vpl_count <= LARGEST_COUNT
-
-
 def _clustered_discs(config: TunedConfig) -> dict[str, Any]:
     return {
         # 0: VPLs are points, and the rest says nothing.
-        "steps": config.parameters.lloyd_iterations if _vpls_are_discs(config) else 0,
+        "steps": config.parameters.lloyd_iterations if config.parameters.vpls_are_discs else 0,
         "samples": sample_count(config.parameters.vpl_count),
         "normal_reach": NORMAL_REACH,
         "disc": {
@@ -127,8 +121,8 @@ def _clustered_discs(config: TunedConfig) -> dict[str, Any]:
     }
 
 
-def _visibility_maps(options: RuntimeOptions, config: TunedConfig) -> dict[str, int]:
-    layout = VisibilityMapLayout.of(options) if config.visibility == "maps" else NO_MAPS
+def _visibility_maps(config: TunedConfig) -> dict[str, int]:
+    layout = VisibilityMapLayout.of(config)
     vpl_count = config.parameters.vpl_count
     blocks = layout.blocks(vpl_count)
     return {
@@ -142,8 +136,10 @@ def _visibility_maps(options: RuntimeOptions, config: TunedConfig) -> dict[str, 
 def left_out(config: TunedConfig) -> tuple[str, ...]:
     """What of a config is not drawn outside the runtime, a sentence each."""
     sentences = []
-    if config.parameters.screen_space_strength > 0.0 and not _vpls_are_discs(config):
+    if config.parameters.screen_space_strength > 0.0 and not config.parameters.vpls_are_discs:
         sentences.append("The screen-space near field is drawn by the runtime alone")
+    if config.quality.interleave > 1:
+        sentences.append("Every pixel gathers every VPL here; only the runtime interleaves them")
     return tuple(sentences)
 
 

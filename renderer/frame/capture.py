@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-import moderngl
 import numpy as np
 from jaxtyping import Bool, Float32, Int32, UInt32
 
 from vpltune.renderer.frame.frame import Frame
 from vpltune.renderer.frame.visibility_map_layout import TEXEL_BYTES
+from vpltune.renderer.gpu.resources import HOST_TEXTURE, Access, Resources
 from vpltune.renderer.scene.views import View, ray_directions_world
 
 
@@ -85,48 +85,51 @@ class CapturedFrame:
     """L: flux-weighted RMS distance of the lit RSM texels from their centroid."""
 
 
-def capture_frame(frame: Frame, view: View, *, maps: bool = True) -> CapturedFrame:
-    """Read back everything that `frame` holds of `view`, which it has just drawn; `maps` False leaves out the
-    visibility maps, which weigh the most."""
-    context = frame.gbuffer.depth.ctx
-    context.memory_barrier(context.BUFFER_UPDATE_BARRIER_BIT)
-    depth_buffer = read_image(frame.gbuffer.depth)
+def capture_frame(frame: Frame, view: View, *, discs: bool, maps: bool = True) -> CapturedFrame:
+    """Read back everything that `frame` holds of `view`, which it has just drawn.
+
+    Args:
+        discs: whether its VPLs are clustered discs.
+        maps: whether to read the visibility maps, which weigh the most.
+    """
+    resources = frame.resources
+    depth_buffer = read_image(resources, "gbuffer_depth")
     valid = depth_buffer > 0.0
     near_plane = np.float32(frame.camera(view).near_plane)
     depth = np.divide(near_plane, depth_buffer, out=np.zeros_like(depth_buffer), where=valid)
     position = view.camera.position_world + ray_directions_world(view) * depth[..., None]
-    vpls = np.frombuffer(frame.virtual_point_lights.virtual_point_lights.read(), np.float32).reshape(-1, 12)
-    statistics = np.frombuffer(frame.virtual_point_lights.frame_statistics.read(), np.float32)
+    vpls = np.frombuffer(resources.read("virtual_point_lights"), np.float32).reshape(-1, 12)
+    statistics = np.frombuffer(resources.read("frame_statistics"), np.float32)
     return CapturedFrame(
         valid=valid,
         depth=depth,
         position_world=position.astype(np.float32),
-        normal_world=octahedral_decode(read_image(frame.gbuffer.normal)),
-        albedo=read_image(frame.gbuffer.albedo)[..., :3].astype(np.float32),
-        direct_irradiance=read_image(frame.direct_irradiance)[..., :3],
-        vpl_irradiance=read_image(frame.vpl_irradiance)[..., :3],
-        indirect_irradiance=read_image(frame.indirect_irradiance)[..., :3],
+        normal_world=octahedral_decode(read_image(resources, "gbuffer_normal")),
+        albedo=read_image(resources, "gbuffer_albedo")[..., :3].astype(np.float32),
+        direct_irradiance=read_image(resources, "direct_irradiance")[..., :3],
+        vpl_irradiance=read_image(resources, "vpl_irradiance")[..., :3],
+        indirect_irradiance=read_image(resources, "indirect_irradiance")[..., :3],
         vpl_position_world=vpls[:, 0:3],
         vpl_normal_world=vpls[:, 4:7],
         vpl_footprint=vpls[:, 3],
         vpl_flux=vpls[:, 8:11],
-        vpls_are_discs=frame.vpls_are_discs,
+        vpls_are_discs=discs,
         visibility_maps=_visibility_maps(frame) if maps else None,
         scene_length=float(statistics[2]),
     )
 
 
 def _visibility_maps(frame: Frame) -> VisibilityMaps | None:
-    if frame.vpl_visibility_maps is None:
+    layout, resources = frame.setup.maps, frame.resources
+    if not layout.size:
         return None
-    maps = frame.vpl_visibility_maps
-    size, refinement = maps.layout.size, maps.layout.refinement
-    texels = np.frombuffer(maps.maps.read(), np.uint32).reshape(-1, size, size, 2)
+    texels = np.frombuffer(resources.read("visibility_maps"), np.uint32)
+    texels = texels.reshape(-1, layout.size, layout.size, 2)
     refined = texels[..., 0] >> 31 != 0
     # At least one: OpenGL does not read nothing.
-    used_bytes = max(1, int(refined.sum())) * refinement**2 * TEXEL_BYTES
-    details = np.frombuffer(maps.details.read(used_bytes), np.uint32)
-    details = details.reshape(-1, refinement, refinement, 2)
+    used_bytes = max(1, int(refined.sum())) * layout.refinement**2 * TEXEL_BYTES
+    details = np.frombuffer(resources.read("visibility_details", used_bytes), np.uint32)
+    details = details.reshape(-1, layout.refinement, layout.refinement, 2)
     # Blocks lie in the order in which the GPU came to them, which is another one each time.
     details = details[texels[refined][:, 1]]
     texels = np.where(refined[..., None], np.uint32(0), texels)
@@ -147,12 +150,13 @@ def _met_surfaces(
 _DTYPES = {"f1": np.uint8, "f2": np.float16, "f4": np.float32, "nu2": np.uint16}
 
 
-def read_image(texture: moderngl.Texture) -> np.ndarray:
-    """A texture as [height, width] or [height, width, channels], row 0 at the top.
+def read_image(resources: Resources, name: str) -> np.ndarray:
+    """The texture called `name` as [height, width] or [height, width, channels], row 0 at the top.
 
     Normalised 16-bit channels come back as float32 in [0, 1], other types as they are stored.
     """
-    texture.ctx.memory_barrier(texture.ctx.TEXTURE_UPDATE_BARRIER_BIT)
+    resources.access((Access(name, HOST_TEXTURE),))
+    texture = resources.texture(name)
     values = np.frombuffer(texture.read(alignment=1), _DTYPES[texture.dtype])
     if texture.dtype == "nu2":
         values = values.astype(np.float32) / np.float32(65535.0)

@@ -7,12 +7,12 @@ import time
 
 import moderngl
 
+from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
 from vpltune.renderer.frame.passes.light_volumes import LightVolumesPass
 from vpltune.renderer.frame.passes.tiled_lights import TiledLightsPass
 from vpltune.renderer.frame.runtime_options import LightPath
-from vpltune.renderer.gpu.camera_uniforms import CameraUniforms
-from vpltune.renderer.gpu.dynamic_light_buffer import DynamicLightBuffer
-from vpltune.renderer.gpu.render_targets import GBuffer, LightAccumulation
+from vpltune.renderer.gpu.render_targets import create_light_accumulation_target
+from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.scene.dynamic_lights import DynamicLights
 
 MEASURED_DRAWS = 2
@@ -23,29 +23,35 @@ _PASSES = {"volumes": LightVolumesPass, "tiles": TiledLightsPass}
 LightPass = LightVolumesPass | TiledLightsPass
 
 
-class LightPrePass:
-    """G-buffer, lights → light accumulation, the way that `light_path` asks for."""
+class LightPrePass(FramePass):
+    """G-buffer, dynamic lights → `light_accumulation`, the way that `light_path` asks for."""
 
-    def __init__(self, context: moderngl.Context, gbuffer: GBuffer, light_path: LightPath):
-        self._context = context
-        self._gbuffer = gbuffer
+    name = "light_pre_pass"
+
+    def __init__(self, resources: Resources, light_path: LightPath):
+        self._resources = resources
         self._light_path = light_path
-        self._buffer = DynamicLightBuffer(context)
+        self._buffer: moderngl.Buffer | None = None
         self._passes: dict[str, LightPass] = {}
         self._chosen: dict[int, str] = {}
         self.milliseconds: dict[int, dict[str, float]] = {}
         """What was measured, by the power of two that holds the number of lights."""
+        # Bound where there are no dynamic lights, and then not read.
+        resources["light_accumulation"] = create_light_accumulation_target(resources.context, (1, 1))
 
-    def draw(self, camera: CameraUniforms, lights: DynamicLights | None) -> LightAccumulation | None:
-        """Upload and sum the lights; None where there are none."""
-        if lights is None or not len(lights):
-            return None
-        self._buffer.upload(lights)
-        light_pass = self.light_pass(self.path(camera, lights))
-        light_pass.draw(camera, lights)
-        return LightAccumulation(light_pass.light_accumulation, lights.accumulation_unit)
+    def wanted(self, inputs: FrameInputs) -> bool:
+        """Where there are dynamic lights."""
+        return inputs.accumulation_unit > 0.0
 
-    def path(self, camera: CameraUniforms, lights: DynamicLights) -> str:
+    def draw(self, inputs: FrameInputs) -> None:
+        """Upload and sum the lights."""
+        assert inputs.dynamic_lights is not None
+        self._upload(inputs.dynamic_lights)
+        light_pass = self.light_pass(self.path(inputs))
+        light_pass.draw(inputs)
+        self._resources.alias("light_accumulation", light_pass.accumulation)
+
+    def path(self, inputs: FrameInputs) -> str:
         """ "volumes" or "tiles". With "auto", the first frame with about this many lights measures both.
 
         A choice once made stands for the numbers of lights up to the same power of two, so that frames
@@ -53,9 +59,10 @@ class LightPrePass:
         """
         if self._light_path != "auto":
             return self._light_path
-        key = (len(lights) - 1).bit_length()
+        assert inputs.dynamic_lights is not None
+        key = (len(inputs.dynamic_lights) - 1).bit_length()
         if key not in self._chosen:
-            measured = {name: self._measured(name, camera, lights) for name in _PASSES}
+            measured = {name: self._measured(name, inputs) for name in _PASSES}
             self.milliseconds[key] = measured
             self._chosen[key] = min(measured, key=lambda name: measured[name])
         return self._chosen[key]
@@ -63,18 +70,25 @@ class LightPrePass:
     def light_pass(self, path: str) -> LightPass:
         """The pass, made when it is first asked for."""
         if path not in self._passes:
-            self._passes[path] = _PASSES[path](self._context, self._gbuffer)
+            self._passes[path] = _PASSES[path](self._resources)
         return self._passes[path]
 
-    def _measured(self, path: str, camera: CameraUniforms, lights: DynamicLights) -> float:
+    def _upload(self, lights: DynamicLights) -> None:
+        """One write a frame; a new buffer only where there are more lights than ever."""
+        size = lights.numbers.nbytes
+        if self._buffer is None or self._buffer.size < size:
+            self._buffer = self._resources["dynamic_lights"] = self._resources.context.buffer(reserve=size)
+        self._buffer.write(lights.numbers)
+
+    def _measured(self, path: str, inputs: FrameInputs) -> float:
         """Milliseconds by the wall clock: timer queries tell too little on software renderers."""
-        light_pass = self.light_pass(path)
-        light_pass.draw(camera, lights)
-        self._context.finish()
+        light_pass, context = self.light_pass(path), self._resources.context
+        light_pass.draw(inputs)
+        context.finish()
         durations = []
         for _ in range(MEASURED_DRAWS):
             start = time.perf_counter()
-            light_pass.draw(camera, lights)
-            self._context.finish()
+            light_pass.draw(inputs)
+            context.finish()
             durations.append(1e3 * (time.perf_counter() - start))
         return min(durations)

@@ -3,12 +3,9 @@
 import math
 from dataclasses import dataclass
 
-import moderngl
 import numpy as np
 from jaxtyping import Float64
 
-from vpltune.renderer.gpu.render_targets import GBuffer
-from vpltune.renderer.gpu.shader_library import set_uniforms
 from vpltune.renderer.scene.light_faces import NEAR_PLANE
 from vpltune.renderer.scene.scene import Camera
 
@@ -23,20 +20,16 @@ class CameraUniforms:
     near_plane: float
     eye_world: tuple[float, float, float]
 
-    def bind_gbuffer(
-        self, program: moderngl.Program | moderngl.ComputeShader, gbuffer: GBuffer, first_unit: int
-    ) -> None:
-        """Bind the G-buffer for shaders that include `common/gbuffer.glsl`."""
-        gbuffer.depth.use(first_unit)
-        gbuffer.normal.use(first_unit + 1)
-        set_uniforms(
-            program,
-            gbuffer_depth=first_unit,
-            gbuffer_normal=first_unit + 1,
-            camera_to_world=self.camera_to_world,
-            tan_half_fov=self.tan_half_fov,
-            near_plane=self.near_plane,
-        )
+    @property
+    def uniforms(self) -> dict[str, object]:
+        """What shaders call them; a shader that lacks one passes over it."""
+        return {
+            "camera_to_world": self.camera_to_world,
+            "world_to_camera": self.world_to_camera,
+            "tan_half_fov": self.tan_half_fov,
+            "near_plane": self.near_plane,
+            "eye_world": self.eye_world,
+        }
 
 
 def camera_uniforms(

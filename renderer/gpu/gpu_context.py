@@ -6,11 +6,14 @@ from collections.abc import Callable
 import moderngl
 
 from vpltune.renderer.errors import MachineError
-from vpltune.renderer.gpu import buffer_bindings
 
 REQUIRED_VERSION = 450
 """OpenGL 4.5: compute shaders and storage buffers (4.3), glClipControl (4.5)."""
 
+MOST_BINDINGS = 16
+"""Most resources that one of our programs declares, rounded up; OpenGL 4.5 guarantees 8 storage buffers."""
+
+# From gl.xml, the registry of OpenGL; moderngl has no names for them.
 _GL_LOWER_LEFT = 0x8CA1
 _GL_ZERO_TO_ONE = 0x935F
 _GL_TEXTURE_2D = 0x0DE1
@@ -18,7 +21,7 @@ _GL_DEPTH_COMPONENT = 0x1902
 _GL_DEPTH_COMPONENT32F = 0x8CAC
 _GL_FLOAT = 0x1406
 
-GL_SRGB8 = 0x8C41
+GL_SRGB8 = 0x8C41  # as above
 
 
 def create_context() -> moderngl.Context:
@@ -45,10 +48,10 @@ def create_context() -> moderngl.Context:
             f"OpenGL {REQUIRED_VERSION} is needed, {name} offers {version}; run: vpltune doctor"
         )
     bindings = context.info["GL_MAX_SHADER_STORAGE_BUFFER_BINDINGS"]
-    if bindings < buffer_bindings.COUNT:
+    if bindings < MOST_BINDINGS:
         name = context.info["GL_RENDERER"]
         context.release()
-        raise MachineError(f"{buffer_bindings.COUNT} storage buffers must be bound, {name} binds {bindings}")
+        raise MachineError(f"{MOST_BINDINGS} storage buffers must be bound, {name} binds {bindings}")
     # "auto" would free objects from whichever thread drops them; ours wait for `free_dropped`.
     context.gc_mode = "context_gc"
     clip_control = _gl_function("glClipControl", None, ctypes.c_uint, ctypes.c_uint)

@@ -12,7 +12,6 @@ import moderngl
 import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
-from vpltune.renderer.gpu import buffer_bindings
 from vpltune.renderer.gpu.bounding_volumes import (
     COUNT_BITS,
     LEAF_ITEMS,
@@ -21,19 +20,22 @@ from vpltune.renderer.gpu.bounding_volumes import (
     build_bounding_volumes,
 )
 from vpltune.renderer.gpu.gpu_context import check_errors
+from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
 from vpltune.renderer.scene.scene import Mesh, Scene
 
-_MESH_DEPTH = 40
-_TOP_DEPTH = 21
+# Levels of a mesh's tree, and of the tree over instances; deeper parts become larger leaves. Choices, which
+# set the stack of a ray.
+_MESH_DEPTH, _TOP_DEPTH = 40, 21
 
 RAY_DEFINES = {
-    **buffer_bindings.DEFINES,
     "RAY_COUNT_BITS": COUNT_BITS,
     # One entry for each level, the bottom, the way out of an instance, and one that is written ahead.
     "RAY_STACK_SIZE": _MESH_DEPTH + _TOP_DEPTH + 3,
 }
 """What a shader that includes `common/ray_hierarchy.glsl` is compiled with."""
+RAY_READS = ("ray_nodes", "ray_triangles", "ray_instances")
+"""And what its program declares."""
 
 _TRIANGLE_DTYPE = np.dtype([(corner, "f4", 4) for corner in "abc"])
 _INSTANCE_DTYPE = np.dtype([("world_to_instance", "f4", (3, 4)), ("root", "u4", 4)])
@@ -64,9 +66,9 @@ class RayHierarchy:
 
     Example:
         >>> rays = RayHierarchy(context, scene, scene_buffers)
-        >>> program = load_compute(context, "visibility", RAY_DEFINES)
+        >>> rays.add_to(resources)
+        >>> program = ComputeProgram(resources, "rays", RAY_DEFINES, reads=RAY_READS)
         >>> rays.update()  # after scene_buffers.set_pose
-        >>> rays.bind()
 
     Raises:
         MachineError: the GPU ran out of memory.
@@ -107,11 +109,11 @@ class RayHierarchy:
         self._instances.write(self._records)
         self._nodes.write(self._top_nodes(to_world, np.flatnonzero(is_seen)))
 
-    def bind(self) -> None:
-        """Make this the scene that rays meet."""
-        self._nodes.bind_to_storage_buffer(buffer_bindings.RAY_NODES)
-        self._triangles.bind_to_storage_buffer(buffer_bindings.RAY_TRIANGLES)
-        self._instances.bind_to_storage_buffer(buffer_bindings.RAY_INSTANCES)
+    def add_to(self, resources: Resources) -> None:
+        """Make this the scene that rays of programs with `RAY_READS` meet."""
+        resources["ray_nodes"] = self._nodes
+        resources["ray_triangles"] = self._triangles
+        resources["ray_instances"] = self._instances
 
     def _joined(self, placed: _Placed) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Roots, all nodes (room for the instances' first) and all triangles, with their places put right."""

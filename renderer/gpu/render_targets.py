@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from vpltune.renderer.gpu import buffer_bindings
 from vpltune.renderer.gpu.gpu_context import check_errors, create_depth_texture
 
 
@@ -48,15 +47,15 @@ class ReflectiveShadowMap:
         """Height of the atlas in texels."""
         return self.depth.height
 
-    def bind(self, program: moderngl.Program | moderngl.ComputeShader, first_unit: int) -> None:
-        """Bind the atlas for shaders that include `common/rsm.glsl`."""
-        for offset, name in enumerate(("depth", "normal", "reflectance")):
-            if f"rsm_{name}" in program:
-                getattr(self, name).use(first_unit + offset)
-                program[f"rsm_{name}"] = first_unit + offset
-        for name, value in (("rsm_columns", self.columns), ("rsm_face_count", self.face_count)):
-            if name in program:
-                program[name] = value
+    @property
+    def uniforms(self) -> dict[str, object]:
+        """What shaders that include `common/rsm.glsl` need to know beside the textures."""
+        return {"rsm_columns": self.columns, "rsm_face_count": self.face_count}
+
+
+def pixel_groups(texture: moderngl.Texture) -> tuple[int, int]:
+    """Workgroups of 8×8 invocations that cover a texture."""
+    return -(-texture.width // 8), -(-texture.height // 8)
 
 
 def create_gbuffer(context: moderngl.Context, size: tuple[int, int]) -> GBuffer:
@@ -74,6 +73,10 @@ def create_gbuffer(context: moderngl.Context, size: tuple[int, int]) -> GBuffer:
 
 
 MAX_ATLAS_COLUMNS = 6
+"""Tiles side by side: the six faces of a point light make one row."""
+GBUFFER_READS = ("gbuffer_depth", "gbuffer_normal")
+RSM_READS = ("rsm_depth", "rsm_normal", "rsm_reflectance", "lights", "rsm_faces")
+"""What a program declares that includes `common/gbuffer.glsl` or `common/rsm.glsl`."""
 
 
 def create_reflective_shadow_map(
@@ -105,41 +108,18 @@ def create_direction_target(context: moderngl.Context, size: tuple[int, int]) ->
     return _nearest(context.texture(size, 2, dtype="nu2"))
 
 
-@dataclass(frozen=True)
-class LightAccumulation:
-    """The sum of the dynamic lights' irradiance at every pixel."""
-
-    texture: moderngl.Texture
-    unit: float
-    """Irradiance [W/m²] that is stored as 1."""
-
-
 def create_light_accumulation_target(context: moderngl.Context, size: tuple[int, int]) -> moderngl.Texture:
     """A half-float RGBA image of irradiance, in the unit that `DynamicLights.accumulation_unit` states."""
     return _nearest(context.texture(size, 4, dtype="f2"))
 
 
-@dataclass(frozen=True)
-class PixelList:
-    """Pixels that a pass leaves to another, counted on the GPU (shaders/common/pixel_list.glsl)."""
-
-    buffer: moderngl.Buffer
-    """The workgroups of an indirect dispatch, the count, and the pixels."""
-
-    def clear(self) -> None:
-        """Empty the list: no workgroup, and no pixel."""
-        self.buffer.write(_EMPTY_PIXEL_LIST)
-
-    def bind(self) -> None:
-        self.buffer.bind_to_storage_buffer(buffer_bindings.PIXEL_LIST)
+EMPTY_DISPATCH = np.array([0, 1, 1, 0], np.uint32).tobytes()
+"""The head of a list that an indirect dispatch goes through: no workgroup, and no element."""
 
 
-_EMPTY_PIXEL_LIST = np.array([0, 1, 1, 0], np.uint32).tobytes()
-
-
-def create_pixel_list(context: moderngl.Context, size: tuple[int, int]) -> PixelList:
-    """A list with room for every pixel of an image of `size` = (width, height)."""
-    return PixelList(context.buffer(reserve=len(_EMPTY_PIXEL_LIST) + 4 * size[0] * size[1]))
+def create_pixel_list(context: moderngl.Context, size: tuple[int, int]) -> moderngl.Buffer:
+    """A list (`shaders/common/pixel_list.glsl`) with room for every pixel of an image of `size`."""
+    return context.buffer(reserve=len(EMPTY_DISPATCH) + 4 * size[0] * size[1])
 
 
 def create_display_target(context: moderngl.Context, size: tuple[int, int]) -> moderngl.Texture:

@@ -7,8 +7,10 @@ import moderngl
 import numpy as np
 from jaxtyping import Float64
 
-from vpltune.renderer.gpu import buffer_bindings
 from vpltune.renderer.gpu.gpu_context import GL_SRGB8, check_errors
+from vpltune.renderer.gpu.gpu_program import RasterProgram
+from vpltune.renderer.gpu.resources import Resources
+from vpltune.renderer.gpu.shader_library import set_uniforms
 from vpltune.renderer.scene.animation import AnimationPlayer
 from vpltune.renderer.scene.placed_boxes import placed_boxes
 from vpltune.renderer.scene.scene import Mesh, Scene, Texture
@@ -28,6 +30,10 @@ _COMMAND_DTYPE = np.dtype(
     [("count", "u4"), ("instances", "u4"), ("first", "u4"), ("base_vertex", "i4"), ("base_instance", "u4")]
 )
 _MAX_ANISOTROPY = 8.0
+"""Samples of a texture along its longer direction. A choice."""
+
+SCENE_READS = ("scene_instances", "skin_influences", "joint_matrices", "base_color_texture")
+"""What a program declares that draws the scene."""
 
 
 @dataclass(frozen=True)
@@ -84,17 +90,22 @@ class SceneBuffers:
         ]
         return self._context.vertex_array(program, content, index_buffer=self._indices, index_element_size=4)
 
-    def draw(self, vertex_array: moderngl.VertexArray, texture_unit: int = 0) -> None:
-        """Draw every instance: one multi-draw for each texture."""
-        self._instances.bind_to_storage_buffer(buffer_bindings.SCENE_INSTANCES)
-        self._influences.bind_to_storage_buffer(buffer_bindings.SKIN_INFLUENCES)
-        self._joints.bind_to_storage_buffer(buffer_bindings.JOINT_MATRICES)
-        program = vertex_array.program
+    def draw(self, program: RasterProgram, vertex_array: moderngl.VertexArray) -> None:
+        """Draw every instance with a program that is bound: one multi-draw for each texture."""
+        unit = program.unit("base_color_texture")
         for group in self.draw_groups:
-            group.texture.use(texture_unit)
-            if "mirrored" in program:
-                program["mirrored"] = group.mirrored
+            group.texture.use(unit)
+            set_uniforms(program.program, mirrored=group.mirrored)
             vertex_array.render_indirect(self._commands, moderngl.TRIANGLES, group.count, group.first)
+
+    def resources(self) -> Resources:
+        """The buffers that `shaders/common/scene_vertex.glsl` reads, and a texture for those without one."""
+        resources = Resources(self._context)
+        resources["scene_instances"] = self._instances
+        resources["skin_influences"] = self._influences
+        resources["joint_matrices"] = self._joints
+        resources["base_color_texture"] = self._white
+        return resources
 
     def set_pose(
         self,

@@ -29,7 +29,10 @@ class ShaderSource:
     def __init__(self, name: str, defines: Mapping[str, Define]):
         self.files: list[str] = []
         body = "\n".join(self._expand(name))
-        constants = "".join(f"#define {key} {_glsl_literal(value)}\n" for key, value in defines.items())
+        constants = "".join(
+            f"#define {key} {_glsl_literal(value)}\n"
+            for key, value in {"MOST_WORKGROUPS": MOST_WORKGROUPS, **defines}.items()
+        )
         self.text = f"#version 450 core\n{constants}{body}\n"
 
     def _expand(self, name: str) -> list[str]:
@@ -83,37 +86,29 @@ def shaders_digest() -> str:
     return digest.hexdigest()
 
 
-def load_program(
-    context: moderngl.Context, name: str, defines: Mapping[str, Define] | None = None
-) -> moderngl.Program:
-    """Compile `shaders/<name>.vert` with `shaders/<name>.frag`.
+def compiled(
+    context: moderngl.Context, sources: tuple[ShaderSource, ...]
+) -> moderngl.Program | moderngl.ComputeShader:
+    """One compute shader, or a vertex and a fragment shader, compiled once for each context and text.
 
     Raises:
-        ShaderError: with the driver's log, file names and lines put right.
+        ShaderError: with the driver's log, in which file names and lines are put right.
     """
-    vertex = ShaderSource(f"{name}.vert", defines or {})
-    fragment = ShaderSource(f"{name}.frag", defines or {})
-    try:
-        return context.program(vertex_shader=vertex.text, fragment_shader=fragment.text)
-    except moderngl.Error as error:
-        log = str(error)
-        source = fragment if "fragment_shader" in log else vertex
-        raise ShaderError(source.explain(log)) from error
-
-
-def load_compute(
-    context: moderngl.Context, name: str, defines: Mapping[str, Define] | None = None
-) -> moderngl.ComputeShader:
-    """Compile `shaders/<name>.comp`.
-
-    Raises:
-        ShaderError: with the driver's log, file names and lines put right.
-    """
-    source = ShaderSource(f"{name}.comp", {"MOST_WORKGROUPS": MOST_WORKGROUPS, **(defines or {})})
-    try:
-        return context.compute_shader(source.text)
-    except moderngl.Error as error:
-        raise ShaderError(source.explain(str(error))) from error
+    if context.extra is None:
+        context.extra = {}
+    programs = context.extra.setdefault("programs", {})
+    key = tuple(source.text for source in sources)
+    if key not in programs:
+        try:
+            if len(sources) == 1:
+                programs[key] = context.compute_shader(sources[0].text)
+            else:
+                vertex, fragment = (source.text for source in sources)
+                programs[key] = context.program(vertex_shader=vertex, fragment_shader=fragment)
+        except moderngl.Error as error:
+            source = sources[-1] if "fragment_shader" in str(error) else sources[0]
+            raise ShaderError(source.explain(str(error))) from error
+    return programs[key]
 
 
 def set_uniforms(program: moderngl.Program | moderngl.ComputeShader, **values: object) -> None:

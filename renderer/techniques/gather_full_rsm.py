@@ -4,34 +4,38 @@ What Dachsbacher and Stamminger (2005) sample at random, in full: it has no samp
 grows with the map.
 """
 
-import moderngl
-
-from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.frame.frame import Frame
-from vpltune.renderer.gpu import buffer_bindings
-from vpltune.renderer.gpu.shader_library import load_compute, set_uniforms
-from vpltune.renderer.scene.views import View
+from vpltune.renderer.frame.frame_pass import FrameInputs
+from vpltune.renderer.gpu.gpu_program import ComputeProgram
+from vpltune.renderer.gpu.render_targets import RSM_READS
+from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.techniques.gathered_vpls import GatheredVpls
 
 
 class GatherFullRsm:
     """RSM of a drawn frame → irradiance. `stride` texels along each side are taken together."""
 
-    def __init__(self, context: moderngl.Context, frame: Frame, stride: int = 1):
-        self._context = context
-        self._frame = frame
+    def __init__(self, frame: Frame, stride: int = 1):
+        self._rsm = frame.rsm
         self._stride = stride
         columns, rows = frame.rsm.depth.size
         self._blocks = (-(-columns // stride), -(-rows // stride))
-        self._vpls = GatheredVpls(context, frame, self._blocks[0] * self._blocks[1])
-        defines = {**buffer_bindings.DEFINES, "RSM_RESOLUTION": frame.rsm.resolution}
-        self._program = load_compute(context, "techniques/gather_full_rsm", defines)
+        self._vpls = GatheredVpls(frame, self._blocks[0] * self._blocks[1])
+        self._program = ComputeProgram(
+            self._vpls.resources,
+            "techniques/gather_full_rsm",
+            {"RSM_RESOLUTION": frame.rsm.resolution},
+            reads=RSM_READS,
+            writes=("virtual_point_lights",),
+        )
 
-    def draw(self, view: View, parameters: ArtistParameters) -> moderngl.Texture:
-        """The irradiance image of a view that the frame has just drawn."""
-        self._vpls.buffer.bind_to_storage_buffer(buffer_bindings.VIRTUAL_POINT_LIGHTS)
-        self._frame.rsm.bind(self._program, 0)
-        set_uniforms(self._program, stride=self._stride, blocks=self._blocks)
-        self._program.run(-(-self._blocks[0] // 8), -(-self._blocks[1] // 8))
-        self._context.memory_barrier(self._context.SHADER_STORAGE_BARRIER_BIT)
-        return self._vpls.draw(view, parameters)
+    def draw(self, inputs: FrameInputs) -> Resources:
+        """The irradiance of what the frame has just drawn; see `GatheredVpls.draw`."""
+        self._program.dispatch(
+            -(-self._blocks[0] // 8),
+            -(-self._blocks[1] // 8),
+            **self._rsm.uniforms,
+            stride=self._stride,
+            blocks=self._blocks,
+        )
+        return self._vpls.draw(inputs)

@@ -1,16 +1,17 @@
 """The frame's own gather over VPLs that came by another way than the frame's."""
 
-import moderngl
+from dataclasses import replace
+
 import numpy as np
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.parameter_block import BLOCK_BYTES, parameter_bytes
 from vpltune.renderer.frame.frame import Frame
+from vpltune.renderer.frame.frame_pass import FrameInputs
 from vpltune.renderer.frame.passes.virtual_point_lights import VPL_BYTES
 from vpltune.renderer.frame.passes.vpl_gather import VplGatherPass
-from vpltune.renderer.gpu import buffer_bindings
-from vpltune.renderer.gpu.parameter_buffer import ParameterBuffer
+from vpltune.renderer.frame.visibility_map_layout import NO_MAPS
 from vpltune.renderer.gpu.render_targets import create_irradiance_target
-from vpltune.renderer.scene.views import View
+from vpltune.renderer.gpu.resources import Resources
 
 VPL_DTYPE = np.dtype(
     [
@@ -26,26 +27,30 @@ VPL_DTYPE = np.dtype(
 
 
 class GatheredVpls:
-    """A buffer of VPLs, and the irradiance that they give a drawn frame."""
+    """A buffer of VPLs, and the irradiance that they give a drawn frame.
 
-    def __init__(self, context: moderngl.Context, frame: Frame, count: int):
-        self._frame = frame
+    `resources` are the frame's, with these VPLs in the place of its own.
+    """
+
+    def __init__(self, frame: Frame, count: int):
         self.count = count
-        self.buffer = context.buffer(reserve=max(1, count) * VPL_BYTES)
-        self.irradiance = create_irradiance_target(context, frame.size)
-        self._parameters = ParameterBuffer(context)
-        self._gather = VplGatherPass(context)
+        self.resources = resources = frame.resources.child()
+        context = resources.context
+        resources["virtual_point_lights"] = context.buffer(reserve=max(1, count) * VPL_BYTES)
+        resources["vpl_irradiance"] = create_irradiance_target(context, frame.setup.size)
+        resources["artist_parameters"] = context.buffer(reserve=BLOCK_BYTES)
+        self._gather = VplGatherPass(resources, 1, NO_MAPS)
 
     def upload(self, vpls: np.ndarray) -> None:
         """Fill the buffer with `count` records of `VPL_DTYPE`."""
-        self.buffer.write(np.ascontiguousarray(vpls).tobytes())
+        self.resources.write("virtual_point_lights", np.ascontiguousarray(vpls).tobytes())
 
-    def draw(self, view: View, parameters: ArtistParameters) -> moderngl.Texture:
-        """Gather from the whole buffer, with the scene length that the frame has measured."""
-        frame = self._frame
-        frame.virtual_point_lights.bind()
-        self.buffer.bind_to_storage_buffer(buffer_bindings.VIRTUAL_POINT_LIGHTS)
-        self._parameters.write(parameters)
-        self._parameters.bind()
-        self._gather.draw(frame.camera(view), frame.gbuffer, self.count, self.irradiance)
-        return self.irradiance
+    def draw(self, inputs: FrameInputs) -> Resources:
+        """Gather from the whole buffer, as points, with the scene length that the frame has measured.
+
+        Returns the resources, whose `vpl_irradiance` is the result.
+        """
+        parameters = replace(inputs.parameters, vpl_count=self.count, lloyd_iterations=0)
+        self.resources.write("artist_parameters", parameter_bytes(parameters))
+        self._gather.draw(replace(inputs, parameters=parameters))
+        return self.resources

@@ -5,13 +5,13 @@ Every ray is tried against every triangle, which serves scenes of some thousand 
 
 import math
 
-import moderngl
 import numpy as np
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.files.srgb import linear_from_srgb
 from vpltune.renderer.frame.frame import Frame
+from vpltune.renderer.frame.frame_pass import FrameInputs
 from vpltune.renderer.frame.point_table import r2_sequence
+from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.scene.scene import Light, Scene, transform_points
 from vpltune.renderer.scene.views import View
 from vpltune.renderer.techniques.gathered_vpls import VPL_DTYPE, GatheredVpls
@@ -19,19 +19,20 @@ from vpltune.renderer.techniques.gathered_vpls import VPL_DTYPE, GatheredVpls
 MIN_COSINE = 0.02
 """Bounds the area that a ray stands for at grazing incidence, as RSM_MIN_COSINE does for a texel."""
 _TRIANGLES_AT_ONCE = 4096
+"""Triangles that all rays are tried against at once. A choice, for memory."""
 
 
 class RayTracedInstantRadiosity:
     """Scene, lights → irradiance of a drawn frame; `count` rays are shared out evenly among the lights."""
 
-    def __init__(self, context: moderngl.Context, frame: Frame, scene: Scene, count: int):
+    def __init__(self, frame: Frame, scene: Scene, count: int):
         self._scene = scene
-        self._vpls = GatheredVpls(context, frame, count)
+        self._vpls = GatheredVpls(frame, count)
 
-    def draw(self, view: View, parameters: ArtistParameters) -> moderngl.Texture:
-        """Trace anew and gather for a view that the frame has just drawn."""
+    def draw(self, view: View, inputs: FrameInputs) -> Resources:
+        """Trace anew and gather for a view that the frame has just drawn; see `GatheredVpls.draw`."""
         self._vpls.upload(traced_vpls(self._scene, view.lights, self._vpls.count))
-        return self._vpls.draw(view, parameters)
+        return self._vpls.draw(inputs)
 
 
 def traced_vpls(scene: Scene, lights: tuple[Light, ...], count: int) -> np.ndarray:

@@ -3,37 +3,36 @@
 No RSM is needed, and what the camera does not see gives no light (Ritschel, Grosch and Seidel 2009).
 """
 
-import moderngl
-
-from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.frame.frame import Frame
-from vpltune.renderer.gpu import buffer_bindings
-from vpltune.renderer.gpu.shader_library import load_compute, set_uniforms
-from vpltune.renderer.scene.views import View
+from vpltune.renderer.frame.frame_pass import FrameInputs
+from vpltune.renderer.gpu.gpu_program import ComputeProgram
+from vpltune.renderer.gpu.render_targets import GBUFFER_READS
+from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.techniques.gathered_vpls import GatheredVpls
 
 
 class ScreenSpaceOnly:
     """G-buffer and direct irradiance of a drawn frame → irradiance."""
 
-    def __init__(self, context: moderngl.Context, frame: Frame, stride: int = 1):
-        self._context = context
-        self._frame = frame
+    def __init__(self, frame: Frame, stride: int = 1):
         self._stride = stride
-        self._blocks = (-(-frame.size[0] // stride), -(-frame.size[1] // stride))
-        self._vpls = GatheredVpls(context, frame, self._blocks[0] * self._blocks[1])
-        self._program = load_compute(context, "techniques/screen_space_only", buffer_bindings.DEFINES)
-
-    def draw(self, view: View, parameters: ArtistParameters) -> moderngl.Texture:
-        """The irradiance image of a view that the frame has just drawn."""
-        frame = self._frame
-        self._vpls.buffer.bind_to_storage_buffer(buffer_bindings.VIRTUAL_POINT_LIGHTS)
-        frame.camera(view).bind_gbuffer(self._program, frame.gbuffer, 0)
-        frame.gbuffer.albedo.use(2)
-        frame.direct_irradiance.use(3)
-        set_uniforms(
-            self._program, gbuffer_albedo=2, direct_irradiance=3, stride=self._stride, blocks=self._blocks
+        width, height = frame.setup.size
+        self._blocks = (-(-width // stride), -(-height // stride))
+        self._vpls = GatheredVpls(frame, self._blocks[0] * self._blocks[1])
+        self._program = ComputeProgram(
+            self._vpls.resources,
+            "techniques/screen_space_only",
+            reads=(*GBUFFER_READS, "gbuffer_albedo", "direct_irradiance"),
+            writes=("virtual_point_lights",),
         )
-        self._program.run(-(-self._blocks[0] // 8), -(-self._blocks[1] // 8))
-        self._context.memory_barrier(self._context.SHADER_STORAGE_BARRIER_BIT)
-        return self._vpls.draw(view, parameters)
+
+    def draw(self, inputs: FrameInputs) -> Resources:
+        """The irradiance of what the frame has just drawn; see `GatheredVpls.draw`."""
+        self._program.dispatch(
+            -(-self._blocks[0] // 8),
+            -(-self._blocks[1] // 8),
+            **inputs.camera.uniforms,
+            stride=self._stride,
+            blocks=self._blocks,
+        )
+        return self._vpls.draw(inputs)

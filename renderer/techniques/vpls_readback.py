@@ -6,15 +6,15 @@ import moderngl
 import numpy as np
 from jaxtyping import Float16, Float32, UInt16
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.frame.capture import octahedral_decode
 from vpltune.renderer.frame.frame import Frame
+from vpltune.renderer.frame.frame_pass import FrameInputs
 from vpltune.renderer.frame.point_table import poisson_disc
-from vpltune.renderer.gpu import buffer_bindings
-from vpltune.renderer.gpu.render_targets import create_irradiance_target
-from vpltune.renderer.gpu.shader_library import load_program, set_uniforms
+from vpltune.renderer.gpu.gpu_program import RasterProgram
+from vpltune.renderer.gpu.render_targets import GBUFFER_READS, create_irradiance_target
+from vpltune.renderer.gpu.resources import Resources
+from vpltune.renderer.gpu.shader_library import set_uniforms
 from vpltune.renderer.scene.light_faces import LightRecords
-from vpltune.renderer.scene.views import View
 from vpltune.renderer.techniques.gathered_vpls import VPL_DTYPE
 
 MIN_COSINE = 0.02
@@ -33,14 +33,17 @@ class RsmTexels:
 class VplsReadback:
     """RSM of a drawn frame → irradiance, with the RSM read back on the way."""
 
-    def __init__(self, context: moderngl.Context, frame: Frame, count: int, seed: int = 0):
-        self._context = context
+    def __init__(self, frame: Frame, count: int, seed: int = 0):
         self._frame = frame
         self._points = poisson_disc(count, seed)
-        self._program = load_program(context, "techniques/vpls_readback", buffer_bindings.DEFINES)
-        self._triangle = context.vertex_array(self._program, [])
-        self.irradiance = create_irradiance_target(context, frame.size)
-        self._framebuffer = context.framebuffer([self.irradiance])
+        self._resources = resources = frame.resources.child()
+        context = resources.context
+        resources["vpl_irradiance"] = target = create_irradiance_target(context, frame.setup.size)
+        self._program = RasterProgram(
+            resources, "techniques/vpls_readback", reads=(*GBUFFER_READS, "frame_statistics")
+        )
+        self._triangle = context.vertex_array(self._program.program, [])
+        self._framebuffer = context.framebuffer([target])
 
     def read(self) -> RsmTexels:
         """The whole RSM, which waits until the GPU has drawn it."""
@@ -85,31 +88,28 @@ class VplsReadback:
         vpls["flux"][lit] = intensity * reflectance[row, column, :3] * (factor * share)[:, None]
         return vpls
 
-    def draw(self, view: View, vpls: np.ndarray, parameters: ArtistParameters) -> moderngl.Texture:
-        """One additive full-screen draw for each VPL."""
-        frame, context = self._frame, self._context
-        frame.virtual_point_lights.bind()
-        frame.camera(view).bind_gbuffer(self._program, frame.gbuffer, 0)
-        set_uniforms(
-            self._program,
-            intensity=parameters.intensity,
-            falloff_footprint=parameters.falloff_footprint,
-            extinction_coefficient=parameters.extinction_coefficient,
-        )
+    def draw(self, inputs: FrameInputs, vpls: np.ndarray) -> Resources:
+        """One additive full-screen draw for each VPL; `vpl_irradiance` of what is returned is the result."""
+        context, parameters = self._resources.context, inputs.parameters
         self._framebuffer.use()
         self._framebuffer.clear()
         context.enable_only(moderngl.BLEND)
         context.blend_func = (moderngl.ONE, moderngl.ONE)
+        self._program.bind(
+            **inputs.camera.uniforms,
+            intensity=parameters.intensity,
+            falloff_footprint=parameters.falloff_footprint,
+            extinction_coefficient=parameters.extinction_coefficient,
+        )
         for vpl in vpls:
             set_uniforms(
-                self._program,
+                self._program.program,
                 position_footprint=(*vpl["position"].tolist(), float(vpl["footprint"])),
                 normal_area=(*vpl["normal"].tolist(), float(vpl["area"])),
                 flux=tuple(vpl["flux"].tolist()),
             )
             self._triangle.render(moderngl.TRIANGLES, vertices=3)
-        context.enable_only(moderngl.NOTHING)
-        return self.irradiance
+        return self._resources
 
 
 def _unprojected(

@@ -1,4 +1,5 @@
-// What cells of light are made from.
+// The samples that clustered disc lights are made from, and the VPL that each sample belongs to.
+// Needs common/virtual_point_lights.glsl. Python: renderer/frame/passes/clustered_discs.py.
 
 layout(std430, binding = VPL_SAMPLES_BINDING) readonly buffer VplSamples {
     VirtualPointLight vpl_samples[];

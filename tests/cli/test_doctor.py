@@ -55,7 +55,7 @@ def test_a_probe_that_says_something_is_taken_at_its_word(probe_script):
 def test_a_crash_is_a_finding(probe_script):
     finding = probe_script("import os; os.abort()")()
     assert (finding.state, finding.mend) == ("missing", "mend the thing")
-    assert finding.detail == "trying it ended the process with SIGABRT"
+    assert finding.detail == "the probe was killed by SIGABRT"
 
 
 def test_an_exception_is_a_finding(probe_script):
@@ -69,7 +69,7 @@ def test_a_hang_is_a_finding(probe_script):
 
 
 def test_silence_is_a_finding(probe_script):
-    assert probe_script("")().detail == "exit code 0 without a word"
+    assert probe_script("")().detail == "exit code 0 and no output"
 
 
 def test_an_answer_of_another_shape_is_a_finding(probe_script):

@@ -1,4 +1,4 @@
-"""Fits as TensorBoard shows them: the loss of every step of each scene, and its errors before and after."""
+"""TensorBoard logs of a batch: the loss of each scene at every step, and relMSE before and after the fit."""
 
 import contextlib
 import datetime
@@ -10,7 +10,7 @@ from typing import Any
 
 @contextlib.contextmanager
 def fit_curves(folder: Path, wanted: bool) -> Iterator[Callable[[dict[str, Any]], None]]:
-    """A function that takes the `record` event of each scene; it does nothing unless `wanted`.
+    """Open the log, and yield a function to call with each `record` event. It does nothing unless `wanted`.
 
     Raises:
         ImportError: tensorboardX is not installed.

@@ -21,8 +21,12 @@ from statistics import fmean
 
 import numpy as np
 
-from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
-from vpltune.renderer.frame.passes.clustered_discs import LARGEST_COUNT
+from vpltune.renderer.config.artist_parameters import (
+    ARTIST_PARAMETERS,
+    LARGEST_DISC_COUNT,
+    ArtistParameters,
+)
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.evaluation.evaluate import EvaluatedView, Evaluation, surrogate_irradiance
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene, SceneOptions, references_of
@@ -69,14 +73,16 @@ def _of_view(
     total = evaluated.metrics["tuned"].relmse
     single, endless = _errors_of_rotations(runtime, view, tuned)
     # More clustered discs than that are drawn as points: another model, and no measure of clamping.
-    most = LARGEST_COUNT if tuned.lloyd_iterations > 0 else _MOST_VPLS
-    many = replace(tuned, vpl_count=int(min(MORE_VPLS * tuned.vpl_count, max(most, tuned.vpl_count))))
+    parameters = tuned.parameters
+    most = LARGEST_DISC_COUNT if parameters.lloyd_iterations > 0 else _MOST_VPLS
+    count = min(MORE_VPLS * parameters.vpl_count, max(most, parameters.vpl_count))
+    many = tuned.with_parameters(replace(parameters, vpl_count=int(count)))
     shares = {
         "noise": evaluated.noise_floor,
         "finite_n": single - endless,
         "clamping": endless - _error(view, runtime_irradiance(runtime, many, view)),
         "visibility": total - evaluated.metrics["ceiling"].relmse,
-        "filter": total - _error(view, _plain_gather(view, tuned)),
+        "filter": total - _error(view, _plain_gather(view, parameters)),
     }
     if one_bounce is not None:
         valid = view.valid & one_bounce.valid
@@ -85,14 +91,16 @@ def _of_view(
     return shares | {"remainder": total - sum(shares.values())}
 
 
-def _errors_of_rotations(
-    runtime: Runtime, view: CapturedView, parameters: ArtistParameters
-) -> tuple[float, float]:
+def _errors_of_rotations(runtime: Runtime, view: CapturedView, config: TunedConfig) -> tuple[float, float]:
     """relMSE of one image, on average, and of infinitely many of them."""
-    runtime.parameters = parameters
     # Evenly over the torus: rotations of a table that lie apart err independently of each other.
     shifts = (np.arange(ROTATIONS)[:, None] * np.array([0.7548776662, 0.5698402910])) % 1.0
-    images = [runtime.capture(view.view, (float(u), float(v))).indirect_irradiance for u, v in shifts]
+    images = [
+        runtime.capture(
+            view.view, config, table_rotation=(float(u), float(v)), maps=False
+        ).indirect_irradiance
+        for u, v in shifts
+    ]
     single = fmean(_error(view, image) for image in images)
     mean = _error(view, np.mean(images, axis=0, dtype=np.float64))
     return single, mean - (single - mean) / (ROTATIONS - 1)

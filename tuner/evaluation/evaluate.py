@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float32
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.scene import Scene
 from vpltune.tuner.fitting.fit_placement import fit_placement
@@ -38,7 +39,7 @@ class EvaluatedView:
     """The three images of one view and how far each is from the reference."""
 
     view: CapturedView
-    tuned: ArtistParameters
+    tuned: TunedConfig
     irradiance: dict[str, Float32[np.ndarray, "height width 3"]]
     """By variant: `default` and `tuned` as the runtime draws them, `ceiling` from the surrogate."""
     metrics: dict[str, ViewMetrics]
@@ -62,7 +63,7 @@ class Evaluation:
             {
                 "name": evaluated.view.view.name,
                 "split": evaluated.view.view.split,
-                "parameters": evaluated.tuned.as_dict(),
+                "parameters": evaluated.tuned.parameters.as_dict(),
                 **{variant: evaluated.metrics[variant].as_dict() for variant in VARIANTS},
                 "noise_floor": evaluated.noise_floor,
                 "samples": evaluated.view.reference.samples,
@@ -108,8 +109,8 @@ def evaluate(
     scene: Scene,
     runtime: Runtime,
     views: tuple[CapturedView, ...],
-    default: ArtistParameters,
-    tuned: ArtistParameters | None,
+    default: TunedConfig,
+    tuned: TunedConfig | None,
     *,
     seed: int = 0,
     known: Sequence[CapturedView] = (),
@@ -131,7 +132,7 @@ def evaluate(
     fitted = [i for i, view in enumerate(views) if view.view.split == "fitted"]
     ceiling = fit_placement(
         [views[i] for i in fitted],
-        default if tuned is None else tuned,
+        (default if tuned is None else tuned).parameters,
         robust_errors([views[i] for i in fitted], seed=seed),
         seed=seed,
         visibility=[visibilities[i] for i in fitted],
@@ -140,7 +141,7 @@ def evaluate(
     evaluated = []
     for index, (view, visibility) in enumerate(zip(views, visibilities, strict=True)):
         chosen = view.drawn_with if tuned is None else tuned
-        assert chosen is not None, "a view that a prior was captured with knows its parameters"
+        assert chosen is not None, "a view that a prior was captured with knows its config"
         evaluated.append(_evaluate_view(runtime, view, known, default, chosen, ceiling, visibility))
         if progress is not None:
             progress(0.5 + 0.5 * (index + 1) / len(views))
@@ -151,8 +152,8 @@ def _evaluate_view(
     runtime: Runtime,
     view: CapturedView,
     known: Sequence[CapturedView],
-    default: ArtistParameters,
-    tuned: ArtistParameters,
+    default: TunedConfig,
+    tuned: TunedConfig,
     ceiling: ArtistParameters,
     visibility: Bool[np.ndarray, "receivers vpls"],
 ) -> EvaluatedView:

@@ -110,7 +110,7 @@ def prepare_scene(
         scene = read_scene(scene_path)
         views, notes = _views(scene, scene_path, options, validated)
         # Before the long work: a machine without OpenGL says so at once.
-        runtime = Runtime(scene, config)
+        runtime = Runtime(scene)
     with watch.stage("reference"):
         references = references_of(
             scene, views, options.seed, options.bounces, lambda share: progress("reference", share)
@@ -121,7 +121,7 @@ def prepare_scene(
         drawn = [(view, reference) for view, reference in pairs if view.split != "validation"]
         captured = []
         for index, (view, reference) in enumerate(drawn):
-            captured += capture_views(runtime, (view,), (reference,), statistics=validated)
+            captured += capture_views(runtime, config, (view,), (reference,), statistics=validated)
             progress("capture", (index + 1) / len(drawn))
     validation = tuple(pair for pair in pairs if pair[0].split == "validation")
     return PreparedScene(scene, runtime, tuple(captured), validation, (*scene.warnings, *notes))

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float32
 
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters, placement
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.fitting.search_space import SearchSpace
@@ -54,7 +55,7 @@ def candidates(
 def validation_metrics(
     runtime: Runtime,
     views: Sequence[tuple[View, ReferenceView]],
-    parameters: Mapping[str, ArtistParameters],
+    configs: Mapping[str, TunedConfig],
     rotations: Sequence[tuple[float, float]],
     *,
     motion: bool = False,
@@ -63,26 +64,27 @@ def validation_metrics(
     """Metrics of every candidate in every view that light reaches, means over the rotations.
 
     Args:
-        runtime: of the views' scene. Its parameters are a candidate's afterwards.
+        runtime: of the views' scene.
         views: with their references.
-        parameters: by name; those with one placement share VPLs and maps.
+        configs: by name, without a prior; those with one placement share VPLs and maps.
         rotations: of the point table.
         motion: whether to measure flicker too, which draws everything twice.
         progress: called with the share done, in [0, 1].
 
     Returns:
-        Metrics by name, and all views as captured with the first parameters, without maps.
+        Metrics by name, and all views as captured with the first config, without maps.
     """
     groups: dict[tuple, list[str]] = {}
-    for name, each in parameters.items():
-        groups.setdefault(placement(each), []).append(name)
-    measured: dict[str, list[ViewMetrics]] = {name: [] for name in parameters}
+    for name, each in configs.items():
+        groups.setdefault(placement(each.parameters), []).append(name)
+    measured: dict[str, list[ViewMetrics]] = {name: [] for name in configs}
     captured_views = []
     for index, (view, reference) in enumerate(views):
-        drawn: dict[str, list[ViewMetrics]] = {name: [] for name in parameters}
+        drawn: dict[str, list[ViewMetrics]] = {name: [] for name in configs}
         for names in groups.values():
             for rotation in rotations:
-                frame, images = runtime.capture_variants(view, [parameters[name] for name in names], rotation)
+                variants = [configs[name] for name in names]
+                frame, images = runtime.capture_variants(view, variants, rotation)
                 captured = CapturedView(view, reference, frame)
                 if len(captured_views) == index:
                     captured_views.append(captured)
@@ -91,9 +93,7 @@ def validation_metrics(
                 moved: Sequence[Float32[np.ndarray, "height width 3"] | None] = [None] * len(images)
                 if motion:
                     beside = moved_by_a_texel(view, frame.scene_length)
-                    _, moved = runtime.capture_variants(
-                        beside, [parameters[name] for name in names], rotation
-                    )
+                    _, moved = runtime.capture_variants(beside, variants, rotation)
                 for name, image, after in zip(names, images, moved, strict=True):
                     metrics = captured.metrics(image)
                     if after is not None:

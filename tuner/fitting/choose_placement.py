@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters, placement
-from vpltune.renderer.frame.passes.clustered_discs import LARGEST_COUNT
+from vpltune.renderer.config.artist_parameters import LARGEST_DISC_COUNT, ArtistParameters, placement
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.fitting.fit_density import with_discs
 from vpltune.tuner.fitting.fit_views import drawn_cost
@@ -42,7 +42,7 @@ class ChosenPlacement:
 def choose_placement(
     runtime: Runtime,
     views: Sequence[CapturedView],
-    start: ArtistParameters,
+    config: TunedConfig,
     errors: Sequence[RobustError],
     *,
     seed: int = 0,
@@ -51,18 +51,19 @@ def choose_placement(
     """The best of the start's own placement and clustered discs with more and more importance.
 
     Args:
-        runtime: of the views' scene. Its parameters are a candidate's afterwards.
-        views: captured with `start`; light reaches each of them.
+        runtime: of the views' scene.
+        views: captured with `config`; light reaches each of them.
+        config: holds the start's parameters.
         errors: how errors count in each view, from `robust_errors` with the same seed.
         progress: called with the share done, in [0, 1].
     """
+    start = config.parameters
     tried = _placements(start)
     screened = slice(0, SCREENED)
     own = _costs(views[screened], errors[screened], seed)
     drawn, costs = {}, {placement_name(start): 1.0}
     for index, parameters in enumerate(tried):
-        runtime.parameters = parameters
-        drawn[parameters] = _captured(runtime, views[screened])
+        drawn[parameters] = _captured(runtime, config.with_parameters(parameters), views[screened])
         ratios = _costs(drawn[parameters], errors[screened], seed) / np.maximum(own, 1e-30)
         # The geometric mean: a view in which a placement is twice as good makes up for one with half as good.
         costs[placement_name(parameters)] = float(np.exp(np.mean(np.log(np.maximum(ratios, 1e-30)))))
@@ -71,8 +72,7 @@ def choose_placement(
     best = min(drawn, key=lambda each: costs[placement_name(each)], default=start)
     if best == start or costs[placement_name(best)] >= 1.0:
         return ChosenPlacement(start, tuple(views), costs)
-    runtime.parameters = best
-    rest = _captured(runtime, views[SCREENED:])
+    rest = _captured(runtime, config.with_parameters(best), views[SCREENED:])
     return ChosenPlacement(best, (*drawn[best], *rest), costs)
 
 
@@ -84,15 +84,17 @@ def placement_name(parameters: ArtistParameters) -> str:
 
 def _placements(start: ArtistParameters) -> list[ArtistParameters]:
     """Those other than the start's own; more VPLs than can be clustered stay points."""
-    clustered = with_discs(start, LLOYD_ITERATIONS) if start.vpl_count <= LARGEST_COUNT else start
+    clustered = with_discs(start, LLOYD_ITERATIONS) if start.vpl_count <= LARGEST_DISC_COUNT else start
     tried = [
         replace(clustered, density_exponent=1.0, density_importance=importance) for importance in IMPORTANCES
     ]
     return [each for each in tried if placement(each) != placement(start)]
 
 
-def _captured(runtime: Runtime, views: Sequence[CapturedView]) -> tuple[CapturedView, ...]:
-    return capture_views(runtime, tuple(v.view for v in views), tuple(v.reference for v in views))
+def _captured(
+    runtime: Runtime, config: TunedConfig, views: Sequence[CapturedView]
+) -> tuple[CapturedView, ...]:
+    return capture_views(runtime, config, tuple(v.view for v in views), tuple(v.reference for v in views))
 
 
 def _costs(views: Sequence[CapturedView], errors: Sequence[RobustError], seed: int) -> np.ndarray:

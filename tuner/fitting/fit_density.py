@@ -25,11 +25,11 @@ import numpy as np
 from jaxtyping import Float
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.fitting.fit_placement import fit_placement
 from vpltune.tuner.fitting.fit_status import Descent
 from vpltune.tuner.fitting.fit_views import robust_errors
-from vpltune.tuner.fitting.search_space import held_for
 from vpltune.tuner.metrics.relative_squared_error import target_of, weighted_squared_error
 from vpltune.tuner.metrics.robust_error import RobustError
 from vpltune.tuner.surrogate.captured_view import CapturedView
@@ -98,46 +98,45 @@ def view_rotations(rotations: Sequence[Rotation], index: int) -> tuple[Rotation,
 def rotated_views(
     runtime: Runtime,
     views: Sequence[CapturedView],
-    parameters: ArtistParameters,
+    config: TunedConfig,
     rotations: Sequence[Rotation],
 ) -> tuple[CapturedView, ...]:
-    """Every view drawn with `parameters` at its rotations, against its one reference."""
-    runtime.parameters = parameters
+    """Every view drawn with `config` at its rotations, against its one reference."""
     return tuple(
         CapturedView(view.view, view.reference, captured)
         for index, view in enumerate(views)
-        for captured in runtime.captures(view.view, view_rotations(rotations, index))
+        for captured in runtime.captures(view.view, config, view_rotations(rotations, index))
     )
 
 
 def rotation_errors(
     runtime: Runtime,
     views: Sequence[CapturedView],
-    parameters: ArtistParameters,
+    config: TunedConfig,
     rotations: Sequence[Rotation],
 ) -> Float[np.ndarray, "views rotations"]:
     """relMSE of the runtime's own image, free of the reference's noise (`tuner.metrics`), by view and
     rotation; 0 where a view is unlit."""
-    rotated = rotated_views(runtime, views, parameters, rotations)
+    rotated = rotated_views(runtime, views, config, rotations)
     return np.array([_relmse(view) for view in rotated]).reshape(len(views), len(rotations))
 
 
 def fit_density(
     runtime: Runtime,
     views: Sequence[CapturedView],
-    start: ArtistParameters,
+    config: TunedConfig,
     *,
     seed: int = 0,
     rotations: Sequence[Rotation] | None = None,
     robust: bool = True,
     progress: Callable[[float], None] | None = None,
 ) -> DensityFit:
-    """Density and falloff for `start.vpl_count` VPLs, robust over rotations of the point table.
+    """Density and falloff for the config's VPL count, robust over rotations of the point table.
 
     Args:
-        runtime: of the views' scene; draws every candidate. Its parameters are a candidate's afterwards.
+        runtime: of the views' scene; draws every candidate, with a full gather.
         views: what to fit to, with references.
-        start: the count, where the falloff's fit begins, and what is not fitted.
+        config: the count, where the falloff's fit begins, and what is not fitted.
         seed: of rotations and pixels.
         rotations: what to fit to; None takes `ROTATIONS` of them.
         robust: whether to minimise the robust error of `tuner.metrics.robust_error`; else relMSE.
@@ -145,7 +144,7 @@ def fit_density(
     """
     chosen = table_rotations(ROTATIONS, seed) if rotations is None else tuple(rotations)
     fits: dict[Density, tuple[ArtistParameters, Descent]] = {}
-    held = held_for(runtime.visibility)
+    config, start = config.with_full_gather(), config.parameters
     errors: tuple[RobustError, ...] | None = None
 
     def best() -> Density:
@@ -155,11 +154,11 @@ def fit_density(
         nonlocal errors
         if density not in fits:
             parameters = _with(start, density)
-            drawn = rotated_views(runtime, views, parameters, chosen)
+            drawn = rotated_views(runtime, views, config.with_parameters(parameters), chosen)
             if robust and errors is None:
                 # The start's own density comes first: its errors set the scale for all.
                 errors = robust_errors(drawn, seed=seed)
-            fit = fit_placement(drawn, parameters, errors, seed=seed, held=held)
+            fit = fit_placement(drawn, parameters, errors, seed=seed)
             fits[density] = fit.parameters, fit.descent
             if progress is not None:
                 progress(min(len(fits) / _TRIALS, 0.99))
@@ -188,15 +187,15 @@ def fit_density(
 def density_document(
     runtime: Runtime,
     views: Sequence[CapturedView],
-    default: ArtistParameters,
+    default: TunedConfig,
     fit: DensityFit,
     seed: int,
 ) -> dict[str, Any]:
     """What metrics.json says of it: the trials, and both errors on rotations that were not fitted to."""
     rotations = table_rotations(HELD_OUT_ROTATIONS, seed, held_out=True)
     errors = {
-        name: float(rotation_errors(runtime, views, parameters, rotations).mean())
-        for name, parameters in (("default", default), ("tuned", fit.parameters))
+        name: float(rotation_errors(runtime, views, config, rotations).mean())
+        for name, config in (("default", default), ("tuned", default.with_parameters(fit.parameters)))
     }
     return {
         "vpl_count": fit.parameters.vpl_count,

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
-from vpltune.tuner.fitting.descent import STEPS, Residuals, descend
+from vpltune.tuner.fitting.descent import Residuals, descend
 from vpltune.tuner.fitting.fit_status import Descent, FitStatus
 from vpltune.tuner.fitting.fit_views import FitView
 from vpltune.tuner.fitting.search_space import SearchSpace
@@ -31,7 +31,6 @@ def fit_to(
     start: ArtistParameters,
     *,
     held: frozenset[str] = frozenset(),
-    steps: int = STEPS,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[ArtistParameters, Descent]:
     """Fit to views that are ready for it; the parameters in `held` stay at the start's, k never does.
@@ -52,7 +51,6 @@ def fit_to(
         (data, FalloffParameters.of(start)),
         moved.point(start),
         offset=offset,
-        steps=steps,
         progress=progress,
     )
     tuned = moved.parameters(found.point, start)

@@ -51,7 +51,6 @@ def fit_placement(
     errors: Sequence[RobustError] | None = None,
     *,
     seed: int = 0,
-    held: frozenset[str] = frozenset(),
     visibility: Sequence[Bool[np.ndarray, "pixels vpls"]] | None = None,
     turns: int = TURNS,
     progress: Callable[[float], None] | None = None,
@@ -61,9 +60,8 @@ def fit_placement(
     Args:
         views: at least one; where they have visibility maps, bias and softness are fitted too.
         start: where to begin, and what the other parameters stay at.
-        errors: how errors count, for each view, from `robust_errors` with the same seed; None minimises
-        relMSE. seed: of the choice of pixels.
-        held: names of falloff parameters that stay at the start's.
+        errors: how errors count in each view, from `robust_errors` with the same seed; None minimises relMSE.
+        seed: of the choice of pixels.
         visibility: for each view, of every pixel with a surface and every VPL, in place of its maps.
         turns: reweightings at most.
         progress: called with the share done, in [0, 1].
@@ -79,7 +77,7 @@ def fit_placement(
                 reweighted(view, error, _image(view.table, current))
                 for view, error in zip(ready, errors, strict=True)
             ]
-        current, descent = fit_to(tuple(ready), current, held=held)
+        current, descent = fit_to(tuple(ready), current)
         if descent.status.nothing_fitted:
             return PlacementFit(start, descent, tuple(ready))
         if maps_move and all(each.overlap is not None for each in pixels):

@@ -82,18 +82,15 @@ def view_pixels(
             runtime itself knows of it, from the view's visibility maps where it has them.
         seed: of the choice of pixels, where there are more than `RECEIVERS_PER_VIEW`.
     """
-    chosen = view.fitted_pixels(RECEIVERS_PER_VIEW, seed)
-    receivers, vpls = gather_inputs(view.captured, chosen)
+    values = view.pixel_values(RECEIVERS_PER_VIEW, seed)
+    receivers, vpls = gather_inputs(view.captured, values.chosen)
     maps, overlap = view.captured.visibility_maps, None
     if maps is not None and visibility is None:
         overlap = surface_overlap(receivers, vpls, map_texels(maps))
-    pixels = np.flatnonzero(view.captured.valid.ravel())[chosen]
-    half_a, half_b = (
-        half.reshape(-1, 3)[pixels] for half in (view.reference.irradiance_a, view.reference.irradiance_b)
-    )
     # As numbers, which a view with maps has too: one compiled gather serves both.
-    known = None if visibility is None else jnp.asarray(visibility[chosen], jnp.float32)
-    return ViewPixels(receivers, vpls, overlap, known, half_a, half_b, pixels, view.view.size)
+    known = None if visibility is None else jnp.asarray(visibility[values.chosen], jnp.float32)
+    halves = values.half_a, values.half_b
+    return ViewPixels(receivers, vpls, overlap, known, *halves, values.flat, view.view.size)
 
 
 def robust_errors(views: Sequence[CapturedView], *, seed: int = 0) -> tuple[RobustError, ...]:
@@ -102,24 +99,13 @@ def robust_errors(views: Sequence[CapturedView], *, seed: int = 0) -> tuple[Robu
     Args:
         seed: of the choice of pixels; the same as that of `view_pixels`.
     """
-    counted = []
-    for view in views:
-        chosen = view.fitted_pixels(RECEIVERS_PER_VIEW, seed)
-        pixels = np.flatnonzero(view.captured.valid.ravel())[chosen]
-        images = (
-            view.reference.irradiance,
-            view.reference.direct_irradiance,
-            view.captured.indirect_irradiance,
-        )
-        counted.append(robust_error(*(image.reshape(-1, 3)[pixels] for image in images)))
-    return tuple(counted)
+    values = [view.pixel_values(RECEIVERS_PER_VIEW, seed) for view in views]
+    return tuple(robust_error(each.reference, each.direct, each.drawn) for each in values)
 
 
 def drawn_cost(view: CapturedView, error: RobustError, *, seed: int = 0) -> float:
     """The cost of the image that a view was captured with."""
-    chosen = view.fitted_pixels(RECEIVERS_PER_VIEW, seed)
-    pixels = np.flatnonzero(view.captured.valid.ravel())[chosen]
-    return error.cost(view.captured.indirect_irradiance.reshape(-1, 3)[pixels])
+    return error.cost(view.pixel_values(RECEIVERS_PER_VIEW, seed).drawn)
 
 
 def fit_view(

@@ -1,9 +1,10 @@
-"""Fits bias and softness of visibility maps: they act on a pair of receiver and VPL through one number.
+"""Fits bias β and softness σ of the visibility maps.
 
-That number is the overlap of `tuner.surrogate.vpl_visibility.surface_overlap`. With the falloff held, each receiver's
-VPLs are summed once over a grid of overlaps; irradiance is then a matrix product of these sums with the share
-that is seen at each overlap, and a step costs next to nothing (`tuner.surrogate.reduced_gather`). `tuner.fitting.fit_placement`
-fits falloff and visibility in turns.
+Both act on a pair of receiver and VPL through one number, its overlap
+(`tuner.surrogate.vpl_visibility.surface_overlap`). With the falloff held, each receiver's VPLs are summed once
+over a grid of overlaps. Irradiance is then a matrix product of these sums with the visible share at each
+overlap, so a step costs microseconds (`tuner.surrogate.reduced_gather`). `tuner.fitting.fit_placement` fits
+falloff and visibility in turns.
 """
 
 from collections.abc import Sequence
@@ -20,9 +21,10 @@ from vpltune.tuner.fitting.fit_status import Descent
 from vpltune.tuner.fitting.fit_views import ViewPixels
 from vpltune.tuner.fitting.search_space import VISIBILITY_SPECS, SearchSpace
 from vpltune.tuner.metrics.relative_squared_error import Target
+from vpltune.tuner.surrogate.receiver_chunks import map_receivers
 from vpltune.tuner.surrogate.reduced_gather import reduce_columns
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
-from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, pair_forms, receivers_at_once, vpl_axes
+from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, pair_forms, vpl_axes
 from vpltune.tuner.surrogate.vpl_visibility import VisibilityParameters, seen_share
 from vpltune.tuner.surrogate.wide_vectors import wide_jit
 
@@ -32,12 +34,12 @@ loss, and raised the held-out relMSE of one development scene to 1.8 times."""
 AT_BOUND = 1e-3
 """Share of the cube's side: nearer to its wall, a parameter is at its bound."""
 STARTS = 9
-"""Along each axis of the grid from whose best point a descent begins."""
+"""Points along each axis of the grid whose best one the descent starts from. A choice."""
 NODES = 96
-"""Of the grid, geometric in the overlap, each a tenth above the one before: half as many miss planted values
+"""Nodes of the overlap grid, each a tenth above the one before. With half as many, planted values are missed
 by a tenth."""
 PAIRS_AT_ONCE = 2**13
-"""Receivers times VPLs that are summed in one go: what these share out between the nodes is 3 MiB."""
+"""Pairs of receiver and VPL in a chunk: their shares at all nodes take 3 MiB."""
 _LEAST = VISIBILITY_SPECS[0].low
 _MOST = sum(spec.high for spec in VISIBILITY_SPECS)
 
@@ -133,29 +135,23 @@ def _sums(
     overlap: Float[Array, "receivers vpls"],
     falloff: FalloffParameters,
 ) -> Float[Array, "receivers 3 columns"]:
-    """What is always seen, then what is shared out between the nodes, linearly in the logarithm.
+    """Sums over VPLs: what is always visible, then the rest by overlap, shared linearly in its logarithm
+    between two nodes.
 
-    As one product for each receiver, which is sooner than a pass over all pairs for each node.
+    One matrix product for each receiver, which is faster than a pass over all pairs for each node.
     """
-    count = receivers.position.shape[0]
-    chunk_size = min(receivers_at_once(vpls.position.shape[0], PAIRS_AT_ONCE), max(count, 1))
-    padding = ((0, -count % chunk_size), (0, 0))
     axes = vpl_axes(vpls)
     step = np.log(_MOST / _LEAST) / (NODES - 1)
     columns = jnp.arange(-1.0, NODES)
 
-    def chunked(values: Array) -> Array:
-        return jnp.pad(values, padding).reshape(-1, chunk_size, values.shape[1])
-
-    def of_chunk(chunk: tuple[Array, Array, Array]) -> Float[Array, "chunk 3 columns"]:
-        position, normal, overlap = chunk
+    def of_chunk(position: Array, normal: Array, overlap: Array) -> Float[Array, "chunk 3 columns"]:
         squared, form_at = pair_forms(Receivers(position, normal), vpls, axes)
         transmittance = jnp.exp(-falloff.extinction_coefficient * jnp.sqrt(squared))
         form = falloff.intensity / jnp.pi * form_at(falloff.falloff_footprint) * transmittance
-        # Along the nodes, from 0; what is always seen lies on a place of its own.
+        # Positions along the nodes, from 0; what is always seen has a column of its own, at -1.
         place = jnp.where(overlap > _LEAST, jnp.log(jnp.maximum(overlap, _LEAST) / _LEAST) / step, -1.0)
         share = jnp.maximum(1.0 - jnp.abs(place[:, :, None] - columns), 0.0)
         return jnp.matmul(form[:, None, :] * vpls.flux.T, share, precision="highest")
 
-    sums = jax.lax.map(of_chunk, tuple(map(chunked, (receivers.position, receivers.normal, overlap))))
-    return sums.reshape(-1, *sums.shape[2:])[:count]
+    arrays = (receivers.position, receivers.normal, overlap)
+    return map_receivers(of_chunk, arrays, vpls.position.shape[0], PAIRS_AT_ONCE)

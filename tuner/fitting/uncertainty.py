@@ -66,7 +66,6 @@ def fit_with_intervals(
     views: tuple[FitView, ...],
     prior: ArtistParameters,
     *,
-    held: frozenset[str] = frozenset(),
     progress: Callable[[float], None] | None = None,
 ) -> tuple[ArtistParameters, Descent, dict[str, Interval]]:
     """Fit from `prior`, and go back to it in what the views leave open, one by one, refitting the rest.
@@ -74,10 +73,9 @@ def fit_with_intervals(
     A parameter is left open where its interval is wide and going back costs next to nothing, or where the fit
     runs to a bound of its range that the prior is not at: what lies beyond the range cannot be meant. Where
     that is the intensity, which no other parameter can stand in for, all of them go back to the prior.
-    Parameters in `held` stay at the prior, and have no interval.
     """
-    names = frozenset(SearchSpace().names) - held
-    tuned, descent = fit_to(views, prior, held=held, progress=progress)
+    names = frozenset(SearchSpace().names)
+    tuned, descent = fit_to(views, prior, progress=progress)
     if descent.status.nothing_fitted:
         return tuned, descent, {}
     found: dict[str, Interval] = {}
@@ -91,7 +89,7 @@ def fit_with_intervals(
         if bound is not None and name == "intensity":
             every = {each: _open(known[each], prior, each, _bound(each, tuned, prior)) for each in known}
             return prior, replace(descent, status=FitStatus.NO_IMPROVEMENT), every
-        without, at_prior = fit_to(views, prior, held=held | {name, *found})
+        without, at_prior = fit_to(views, prior, held=frozenset({name, *found}))
         if bound is None and at_prior.loss - descent.loss > PRIOR_COST * (descent.loss - offset):
             continue
         found[name] = _open(known[name], prior, name, bound)

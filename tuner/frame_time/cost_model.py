@@ -11,15 +11,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
-import moderngl
-
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
-from vpltune.renderer.frame.runtime import FEW_FACES, RSM_RESOLUTION, RSM_RESOLUTION_OF_MANY, Runtime
-from vpltune.renderer.frame.runtime_options import RuntimeOptions
+from vpltune.renderer.frame.rsm_resolution import rsm_resolution
+from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.gpu.shader_library import shaders_digest
-from vpltune.renderer.scene.light_faces import face_count
 from vpltune.renderer.scene.scene import Scene
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.reference.cache import cache_folder
@@ -33,24 +31,11 @@ INTERLEAVES = (1, 2, 4)
 MAP_SIZES = (8, 16, 24)
 RSM_DIVISORS = (1, 2, 4)
 
-_RSM_PASSES = frozenset({"reflective_shadow_map", "vpl_importance", "virtual_point_lights"})
+_RSM_PASSES = frozenset(
+    {"reflective_shadow_map", "vpl_importance", "virtual_point_lights", "clustered_discs"}
+)
 _GATHER_PASSES = frozenset({"vpl_gather", "interleaved_filter"})
-_FORMAT = 3
-
-
-@dataclass(frozen=True)
-class FrameChoice:
-    """What a program chooses to fit a frame into its time, beside the number of VPLs."""
-
-    interleave: int = 1
-    visibility_map_size: int = RuntimeOptions().visibility_map_size
-    rsm_resolution: int = RSM_RESOLUTION
-    """Of a face: shadows of direct light come from the same map, and grow coarser with it."""
-
-    def runtime(self, scene: Scene, config: TunedConfig, context: moderngl.Context) -> Runtime:
-        """A runtime that draws so."""
-        options = RuntimeOptions(interleave=self.interleave, visibility_map_size=self.visibility_map_size)
-        return Runtime(scene, config, options, rsm_resolution=self.rsm_resolution, context=context)
+_FORMAT = 4
 
 
 @dataclass(frozen=True)
@@ -69,13 +54,14 @@ class CostModel:
     """Pass costs along each axis, the other choices being the first of theirs."""
 
     interleave: dict[int, Costs]
-    visibility_map_size: dict[int, Costs]
+    map_size: dict[int, Costs]
     rsm_resolution: dict[int, Costs]
 
-    def costs(self, choice: FrameChoice) -> Costs:
+    def costs(self, choice: Quality) -> Costs:
         """Every pass of a frame so drawn."""
         gathered = self.interleave[choice.interleave]
-        mapped = self.visibility_map_size.get(choice.visibility_map_size, {})
+        mapped = self.map_size.get(choice.map_size, {})
+        assert choice.rsm_resolution is not None, "a choice spells its RSM resolution out"
         shadowed = self.rsm_resolution[choice.rsm_resolution]
         combined = {}
         for name, cost in gathered.items():
@@ -98,16 +84,16 @@ class CostModel:
             }
         )
 
-    def milliseconds(self, choice: FrameChoice, count: int) -> float:
+    def milliseconds(self, choice: Quality, count: int) -> float:
         """Of a whole frame with `count` VPLs."""
         return sum(cost.fixed + cost.per_vpl * count for cost in self.costs(choice).values())
 
-    def count_within(self, choice: FrameChoice, milliseconds: float) -> float:
+    def count_within(self, choice: Quality, milliseconds: float) -> float:
         """How many VPLs a frame can have in that time; below 1, none."""
         costs = self.costs(choice).values()
         return (milliseconds - sum(cost.fixed for cost in costs)) / self.per_vpl(choice)
 
-    def per_vpl(self, choice: FrameChoice) -> float:
+    def per_vpl(self, choice: Quality) -> float:
         """Milliseconds for each VPL more."""
         # 1e-6: no timer sees less, and noise may make a slope vanish.
         return max(sum(cost.per_vpl for cost in self.costs(choice).values()), 1e-6)
@@ -120,14 +106,14 @@ def measured_cost_model(
     scene: Scene,
     views: Sequence[View],
     config: TunedConfig,
-    context: moderngl.Context,
+    runtime: Runtime,
     progress: Callable[[float], None] | None = None,
 ) -> CostModel:
     """The cost of a frame that shows the slowest of `views`, from the cache or measured now.
 
     `config` says how VPLs are occluded, and whether there is importance and a near field to pay for.
     """
-    key = costs_key(str(context.info["GL_RENDERER"]), scene, views, config)
+    key = costs_key(runtime.opengl_renderer, scene, views, config)
     path = cache_folder() / "costs" / f"{key}.json"
     kept = _read(path)
     if kept is not None:
@@ -136,7 +122,7 @@ def measured_cost_model(
     axes: dict[str, dict[int, Costs]] = {}
     values = {
         "interleave": INTERLEAVES,
-        "visibility_map_size": MAP_SIZES if config.visibility == "maps" else (),
+        "map_size": MAP_SIZES if config.visibility == "maps" else (),
         "rsm_resolution": rsm_resolutions(views[0]),
     }
     total = sum(len(axis) for axis in values.values())
@@ -146,7 +132,7 @@ def measured_cost_model(
         for value in axis:
             choice = replace(base, **{name: value})
             if choice not in measured:
-                measured[choice] = _measure(choice.runtime(scene, config, context), views, config)
+                measured[choice] = _measure(runtime, views, replace(config, quality=choice))
             axes[name][value] = measured[choice]
             done += 1
             if progress is not None:
@@ -170,15 +156,14 @@ def costs_key(renderer: str, scene: Scene, views: Sequence[View], config: TunedC
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
-def default_choice(view: View) -> FrameChoice:
-    """What a runtime does unless told otherwise."""
-    return FrameChoice(rsm_resolution=rsm_resolutions(view)[0])
+def default_choice(view: View) -> Quality:
+    """The default quality, with its RSM resolution spelled out."""
+    return Quality(rsm_resolution=rsm_resolution(view.lights))
 
 
 def rsm_resolutions(view: View) -> tuple[int, ...]:
-    """Of a face, the runtime's own first."""
-    own = RSM_RESOLUTION if face_count(view.lights) <= FEW_FACES else RSM_RESOLUTION_OF_MANY
-    return tuple(own // divisor for divisor in RSM_DIVISORS)
+    """RSM resolutions to choose from, the runtime's own first."""
+    return tuple(rsm_resolution(view.lights) // divisor for divisor in RSM_DIVISORS)
 
 
 def _times(costs: Costs, factor: float) -> Costs:
@@ -194,8 +179,8 @@ def _measure(runtime: Runtime, views: Sequence[View], config: TunedConfig) -> Co
     """The slowest view's passes at both counts, as lines through them."""
     at_count = []
     for count in COUNTS:
-        runtime.parameters = replace(config.parameters, vpl_count=count)
-        by_view = [runtime.pass_milliseconds(view, FRAMES) for view in views]
+        counted = config.with_parameters(replace(config.parameters, vpl_count=count))
+        by_view = [runtime.pass_milliseconds(view, counted, FRAMES) for view in views]
         at_count.append(max(by_view, key=lambda passes: sum(passes.values())))
     low, high = at_count
     costs = {}

@@ -2,21 +2,19 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig, write_config
 from vpltune.renderer.files.atomic_file import write_text_whole, written_whole
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene
 from vpltune.tuner.fitting.fit_status import Descent
-from vpltune.tuner.frame_time.cost_model import FrameChoice
 from vpltune.tuner.frame_time.frame_budget import BudgetFit, FrameBudget
 from vpltune.tuner.frame_time.pareto_front import fit_front
 
 _COLUMNS = ("milliseconds", "relmse", "vpl_count")
-_CHOICES = tuple(choice.name for choice in fields(FrameChoice))
+_CHOICES = ("interleave", "map_size", "rsm_resolution")
 
 
 @dataclass(frozen=True)
@@ -47,8 +45,8 @@ def fit_to_budget(
     *,
     seed: int = 0,
     progress: Callable[[float], None] = lambda share: None,
-) -> tuple[ArtistParameters, Descent, dict[str, Any]]:
-    """The parameters for a budget, and the keys `budget` and `pareto` of metrics.json.
+) -> tuple[TunedConfig, Descent, dict[str, Any]]:
+    """The config that meets a budget, and the keys `budget` and `pareto` of metrics.json.
 
     A front's configs, table and plot are written into `output`; where no time is asked for, the front's most
     exact point is what is returned.
@@ -71,7 +69,7 @@ def fit_to_budget(
         found["pareto"] = write_front(output, points, start, size)
         best = best or points[-1]
     assert best is not None, "options ask for neither"
-    return best.parameters, best.descent, found
+    return best.config(start), best.descent, found
 
 
 def write_front(
@@ -86,8 +84,8 @@ def write_front(
     rows = []
     for index, point in enumerate(points):
         name = f"pareto/{index}.json"
-        provenance = {"milliseconds": point.frame.milliseconds, **asdict(point.frame.choice)}
-        write_config(output / name, TunedConfig(point.parameters, provenance, start.visibility))
+        provenance = {"milliseconds": point.frame.milliseconds}
+        write_config(output / name, replace(point.config(start), provenance=provenance, fit=None))
         document = {"frame_size": list(frame_size), **point.document()}
         rows.append({**document, "parameters": point.parameters.as_dict(), "config": name})
     lines = [",".join((*_COLUMNS, *_CHOICES, "config"))]

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
+from vpltune.renderer.config.quality import MetBudget, Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import InputError
-from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene
 from vpltune.tuner.fitting.fit_density import (
     FEW_VPLS,
@@ -28,13 +28,11 @@ from vpltune.tuner.fitting.fit_density import (
 from vpltune.tuner.fitting.fit_placement import fit_placement
 from vpltune.tuner.fitting.fit_status import Descent
 from vpltune.tuner.fitting.fit_views import robust_errors
-from vpltune.tuner.fitting.search_space import held_for
 from vpltune.tuner.frame_time.cost_model import (
     COUNTS,
     INTERLEAVES,
     MAP_SIZES,
     CostModel,
-    FrameChoice,
     costs_key,
     default_choice,
     measured_cost_model,
@@ -72,7 +70,7 @@ Progress = Callable[[float], None]
 class SettledFrame:
     """A VPL count whose measured frame fits the budget."""
 
-    choice: FrameChoice
+    choice: Quality
     vpl_count: int
     milliseconds: float
     tries: int
@@ -88,8 +86,14 @@ class BudgetFit:
     parameters: ArtistParameters
     descent: Descent
     relmse: float
-    """In the runtime with all choices, over fitted views and held-out rotations."""
-    runtime: Runtime
+    """Mean relMSE of the drawn images over fitted views and held-out rotations."""
+    frame_size: tuple[int, int]
+    machine: str
+
+    def config(self, start: TunedConfig) -> TunedConfig:
+        """`start` with what was found, which draws the images that were measured."""
+        met = MetBudget(self.budget, self.frame_size, self.machine)
+        return replace(start.with_parameters(self.parameters), quality=replace(self.frame.choice, budget=met))
 
     def document(self) -> dict[str, Any]:
         """What metrics.json says of it."""
@@ -127,11 +131,9 @@ class FrameBudget:
         self._timed = tuple(replace(view.view, size=frame_size) for view in fitted)
         guessed = replace(with_discs(start.parameters), density_importance=GUESSED_IMPORTANCE)
         self._start = replace(start, parameters=guessed)
-        self._runtimes: dict[FrameChoice, Runtime] = {}
+        self._runtime = prepared.runtime
         self.default_choice = default_choice(self._timed[0])
-        measured = measured_cost_model(
-            prepared.scene, self._timed, self._start, prepared.runtime.context, progress
-        )
+        measured = measured_cost_model(prepared.scene, self._timed, self._start, prepared.runtime, progress)
         self.costs: CostModel = measured.scaled(self._level(measured))
 
     def least_milliseconds(self) -> float:
@@ -151,18 +153,27 @@ class FrameBudget:
         choice = self._best_choice(budget, lambda share: report(_CHOSEN * share))
         frame = self._settle(choice, budget)
         start = replace(self._start.parameters, vpl_count=frame.vpl_count)
-        fit = self._fitted(start, lambda share: report(_CHOSEN + (_FITTED - _CHOSEN) * share))
+        fit = self._fitted(choice, start, lambda share: report(_CHOSEN + (_FITTED - _CHOSEN) * share))
         # Without importance a frame is cheaper, and the falloff does not change what it costs.
         settled = self._settle(choice, budget, fit.parameters)
         parameters = replace(fit.parameters, vpl_count=settled.vpl_count)
         if abs(settled.vpl_count - frame.vpl_count) > 0.1 * frame.vpl_count:
-            parameters = self._falloff_at(parameters)
-        runtime = self.runtime(settled.choice)
+            parameters = self._falloff_at(choice, parameters)
         rotations = table_rotations(HELD_OUT_ROTATIONS, self._seed, held_out=True)
-        errors = rotation_errors(runtime, self._views, parameters, rotations)
+        config = self._config(settled.choice, parameters)
+        errors = rotation_errors(self._runtime, self._views, config, rotations)
         predicted = self.costs.milliseconds(settled.choice, settled.vpl_count)
         report(1.0)
-        return BudgetFit(budget, settled, predicted, parameters, fit.descent, float(errors.mean()), runtime)
+        return BudgetFit(
+            budget,
+            settled,
+            predicted,
+            parameters,
+            fit.descent,
+            float(errors.mean()),
+            self._timed[0].size,
+            self._runtime.opengl_renderer,
+        )
 
     def content_key(self) -> str:
         """Of all that fits depend on, but for how fast the machine is at the moment."""
@@ -180,38 +191,42 @@ class FrameBudget:
                 digest.update(np.ascontiguousarray(half).tobytes())
         return digest.hexdigest()
 
-    def milliseconds(self, runtime: Runtime, parameters: ArtistParameters, frames: int = FRAMES) -> float:
-        """Of the slowest view's frame, as it measures now."""
-        runtime.parameters = parameters
-        return max(runtime.frame_milliseconds(view, frames) for view in self._timed)
+    def milliseconds(self, choice: Quality, parameters: ArtistParameters, frames: int = FRAMES) -> float:
+        """Frame time of the slowest view, as it measures now."""
+        config = self._config(choice, parameters)
+        return max(self._runtime.frame_milliseconds(view, config, frames) for view in self._timed)
 
     def _level(self, costs: CostModel) -> float:
         """How much longer frames take than the model says: passes overlap in them, and a model is kept longer
         than a machine is as busy as it was."""
         choice = self.default_choice
-        runtime = self.runtime(choice)
         measured = sum(
-            self.milliseconds(runtime, replace(self._start.parameters, vpl_count=count), LEVEL_FRAMES)
+            self.milliseconds(choice, replace(self._start.parameters, vpl_count=count), LEVEL_FRAMES)
             for count in COUNTS
         )
         return measured / sum(costs.milliseconds(choice, count) for count in COUNTS)
 
-    def _choices(self, budget: float) -> list[FrameChoice]:
+    def _choices(self, budget: float) -> list[Quality]:
         """All ways to gather, with the finest RSM that leaves enough of the budget."""
-        maps = MAP_SIZES if self._start.visibility == "maps" else (FrameChoice.visibility_map_size,)
+        given = self._start.quality
+        maps = MAP_SIZES if self._start.visibility == "maps" else (given.map_size,)
         resolutions = rsm_resolutions(self._timed[0])
         resolution = next(
             (each for each in resolutions if self._rsm_milliseconds(each) <= SHADOW_SHARE * budget),
             resolutions[-1],
         )
-        return [FrameChoice(interleave, size, resolution) for interleave in INTERLEAVES for size in maps]
+        return [
+            replace(given, interleave=interleave, map_size=size, rsm_resolution=resolution, budget=None)
+            for interleave in INTERLEAVES
+            for size in maps
+        ]
 
     def _rsm_milliseconds(self, resolution: int) -> float:
         names = ("reflective_shadow_map", "vpl_importance", "virtual_point_lights")
         costs = self.costs.rsm_resolution[resolution]
         return sum(costs[name].fixed for name in names if name in costs)
 
-    def _best_choice(self, budget: float, progress: Progress) -> FrameChoice:
+    def _best_choice(self, budget: float, progress: Progress) -> Quality:
         """Least error of the start's own parameters, each choice with the VPLs that it can pay for."""
         rotations = table_rotations(CHOICE_ROTATIONS, self._seed)
         errors = {}
@@ -222,7 +237,8 @@ class FrameBudget:
             if count < LEAST_COUNT * choice.interleave**2:
                 continue  # every pixel of a block needs VPLs of its own
             parameters = replace(self._start.parameters, vpl_count=int(count))
-            errors[choice] = rotation_errors(self.runtime(choice), self._views, parameters, rotations).mean()
+            config = self._config(choice, parameters)
+            errors[choice] = rotation_errors(self._runtime, self._views, config, rotations).mean()
         if not errors:
             raise InputError(
                 f"--budget-ms: must be at least {self.least_milliseconds():.3g} on this machine for "
@@ -231,13 +247,12 @@ class FrameBudget:
         return min(errors, key=lambda choice: errors[choice])
 
     def _settle(
-        self, choice: FrameChoice, budget: float, parameters: ArtistParameters | None = None
+        self, choice: Quality, budget: float, parameters: ArtistParameters | None = None
     ) -> SettledFrame:
         """Change the count until the measured frame fits: the slope is the model's, its level measured.
 
         With the parameters that it will have, it must fit twice: of many tries one would pass by luck.
         """
-        runtime = self.runtime(choice)
         chosen = self._start.parameters if parameters is None else parameters
         least, most = LEAST_COUNT * choice.interleave**2, int(parameter_spec("vpl_count").high)
         expected = self.costs.count_within(choice, AIM * budget)
@@ -247,7 +262,7 @@ class FrameBudget:
         frames = int(np.clip(TIMED / budget, FRAMES, MOST_FRAMES)) if final else FRAMES
         for attempt in range(TRIES):
             count = int(np.clip(round(wanted), least, most))
-            taken = self.milliseconds(runtime, replace(chosen, vpl_count=count), frames)
+            taken = self.milliseconds(choice, replace(chosen, vpl_count=count), frames)
             confirmed = count in measured
             # A count that is asked for again has been timed on a quieter or busier machine: both count.
             measured[count] = 0.5 * (taken + measured[count]) if confirmed else taken
@@ -265,32 +280,27 @@ class FrameBudget:
         best = max(fitting, key=lambda count: fitting[count])
         return SettledFrame(choice, best, fitting[best], TRIES)
 
-    def _fitted(self, start: ArtistParameters, progress: Progress | None) -> DensityFit:
+    def _fitted(self, choice: Quality, start: ArtistParameters, progress: Progress | None) -> DensityFit:
         # The more VPLs, the less does one placement differ from another: the work is that of few.
         rotations = int(np.clip(ROTATIONS * FEW_VPLS // start.vpl_count, 2, ROTATIONS))
         return fit_density(
-            self._prepared.runtime,
+            self._runtime,
             self._views,
-            start,
+            self._config(choice, start),
             seed=self._seed,
             rotations=table_rotations(rotations, self._seed),
             progress=progress,
         )
 
-    def _falloff_at(self, parameters: ArtistParameters) -> ArtistParameters:
+    def _falloff_at(self, choice: Quality, parameters: ArtistParameters) -> ArtistParameters:
         rotations = table_rotations(HELD_OUT_ROTATIONS, self._seed)
-        captured = rotated_views(self._prepared.runtime, self._views, parameters, rotations)
+        config = self._config(choice, parameters).with_full_gather()
+        captured = rotated_views(self._runtime, self._views, config, rotations)
         errors = robust_errors(captured, seed=self._seed)
-        held = held_for(self._start.visibility)
-        return fit_placement(captured, parameters, errors, seed=self._seed, held=held).parameters
+        return fit_placement(captured, parameters, errors, seed=self._seed).parameters
 
-    def runtime(self, choice: FrameChoice) -> Runtime:
-        """What draws so; the same one each time."""
-        if choice not in self._runtimes:
-            self._runtimes[choice] = choice.runtime(
-                self._prepared.scene, self._start, self._prepared.runtime.context
-            )
-        return self._runtimes[choice]
+    def _config(self, choice: Quality, parameters: ArtistParameters) -> TunedConfig:
+        return replace(self._start, parameters=parameters, quality=choice, auto=None)
 
 
 def _slope(measured: dict[int, float], model: float) -> float:

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.tuner.fitting.fit_status import Descent, FitStatus
-from vpltune.tuner.frame_time.cost_model import FrameChoice
 from vpltune.tuner.frame_time.frame_budget import BudgetFit, FrameBudget, Progress, SettledFrame
 from vpltune.tuner.reference.cache import cache_folder
 
@@ -74,7 +74,7 @@ def _timed_in_turns(budget: FrameBudget, points: Sequence[BudgetFit]) -> list[Bu
     taken: list[list[float]] = [[] for _ in points]
     for _ in range(TURNS):
         for times, point in zip(taken, points, strict=True):
-            times.append(budget.milliseconds(point.runtime, point.parameters, FRAMES_A_TURN))
+            times.append(budget.milliseconds(point.frame.choice, point.parameters, FRAMES_A_TURN))
     return [
         replace(point, frame=replace(point.frame, milliseconds=statistics.median(times)))
         for times, point in zip(taken, points, strict=True)
@@ -96,7 +96,7 @@ class _KeptFits:
         try:
             document = json.loads(self._path.read_text(encoding="utf-8"))
             self.budgets = [float(each) for each in document["budgets"]]
-            self.fits = [tuple(_read_fit(each, budget) for each in fits) for fits in document["fits"]]
+            self.fits = [tuple(_read_fit(each) for each in fits) for fits in document["fits"]]
         except (OSError, ValueError, TypeError, KeyError, AttributeError):
             # None was interrupted, or its file is damaged.
             self.budgets, self.fits = _budgets(budget), []
@@ -133,12 +133,14 @@ def _fit_document(fit: BudgetFit) -> dict[str, Any]:
             "status": descent.status.name,
         },
         "relmse": fit.relmse,
+        "frame_size": list(fit.frame_size),
+        "machine": fit.machine,
     }
 
 
-def _read_fit(document: dict[str, Any], budget: FrameBudget) -> BudgetFit:
+def _read_fit(document: dict[str, Any]) -> BudgetFit:
     descent = document["descent"]
-    choice = FrameChoice(**document["frame"]["choice"])
+    choice = Quality(**document["frame"]["choice"])
     return BudgetFit(
         document["budget"],
         SettledFrame(**{**document["frame"], "choice": choice}),
@@ -152,5 +154,6 @@ def _read_fit(document: dict[str, Any], budget: FrameBudget) -> BudgetFit:
             FitStatus[descent["status"]],
         ),
         document["relmse"],
-        budget.runtime(choice),
+        tuple(document["frame_size"]),
+        document["machine"],
     )

@@ -43,15 +43,15 @@ def evaluate_scene(scene_path: Path, options: EvaluateOptions, progress: Progres
             prepared.scene,
             prepared.runtime,
             prepared.views,
-            default_like(options.tuned.parameters),
-            None if options.tuned.auto is not None else options.tuned.parameters,
+            options.tuned.with_parameters(default_like(options.tuned.parameters)),
+            None if options.tuned.auto is not None else options.tuned,
             seed=options.seed,
             progress=lambda share: progress("evaluate", share),
         )
-    budget = {}
+    breakdown = {}
     if options.split_error:
         with watch.stage("split error"):
-            budget["error_breakdown"] = error_breakdown(
+            breakdown["error_breakdown"] = error_breakdown(
                 prepared,
                 evaluation,
                 options,
@@ -66,11 +66,12 @@ def evaluate_scene(scene_path: Path, options: EvaluateOptions, progress: Progres
         "scene": str(scene_path),
         "parameters": options.tuned.parameters.as_dict(),
         "visibility": options.tuned.visibility,
+        "quality": options.tuned.quality.as_dict(),
         "views": str(views_path),
         "metrics": evaluation.summary(),
         "seconds": {**watch.report(), "fit": 0.0},
         "status": "ok",
-        **budget,
+        **breakdown,
         "ceiling_parameters": evaluation.ceiling_parameters.as_dict(),
         "per_view": evaluation.per_view(),
         "notes": [*prepared.notes, *evaluation.notes()],

@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec, placement
-from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS, place_of, value_at
-from vpltune.renderer.config.tuned_config import TunedConfig, read_config, write_config
+from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS
+from vpltune.renderer.config.tuned_config import FitNote, TunedConfig, read_config, write_config
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.renderer.files.strict_json import strict_json
-from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.views import write_views
 from vpltune.tuner.evaluation.comparison_image import write_comparison
 from vpltune.tuner.evaluation.error_breakdown import error_breakdown
@@ -93,8 +92,8 @@ def fit(
         options: fields of `tuner.evaluation.prepare_scene.SceneOptions`: views, seed, bounces, camera, light, size …
 
     Example:
-        >>> result = vpltune.tuner.fit("configs/scenes/cornell-box.glb", "out/cornell", views=4)
-        >>> Runtime(vpltune.renderer.read_scene(path), result.config).render(view)
+        >>> result = vpltune.fit("configs/scenes/cornell-box.glb", "out/cornell", views=4)
+        >>> vpltune.Runtime(vpltune.read_scene(path)).render(view, result.config)
     """
     chosen = FitOptions(start=read_config(config), **options)
     return fit_scene(Path(scene), Path(output), chosen, progress or (lambda stage, share: None))
@@ -115,7 +114,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
         raise InputError(f"{output}: the output must be a folder, and is a file")
     prepared = prepare_scene(scene_path, options, options.start, watch, progress, validated=True)
     fitted = [view for view in prepared.views if view.view.split == "fitted"]
-    drawn = [view.drawn_with for view in fitted if view.drawn_with is not None]
+    drawn = [view.drawn_with.parameters for view in fitted if view.drawn_with is not None]
     start = replace(options.start, parameters=fit_start(options.start, drawn), auto=None)
     if any(view.lit for view in fitted):
         found = _judged(prepared, start, options, output, watch, progress)
@@ -123,10 +122,10 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
         found = _unlit(start)
     with watch.stage("evaluate"):
         evaluation = _evaluated(prepared, found, options, progress)
-    budget = {}
+    breakdown = {}
     if options.split_error:
         with watch.stage("split error"):
-            budget["error_breakdown"] = error_breakdown(
+            breakdown["error_breakdown"] = error_breakdown(
                 prepared, evaluation, options, lambda share: progress("split error", share)
             )
     config = _config(prepared, found, options)
@@ -141,6 +140,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
         "scene": str(scene_path),
         "parameters": config.parameters.as_dict(),
         "visibility": config.visibility,
+        "quality": config.quality.as_dict(),
         "views": str(output / "views.json"),
         "metrics": evaluation.summary(),
         "seconds": watch.report(),
@@ -154,7 +154,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
         },
         "uncertainty": {name: asdict(interval) for name, interval in found.known.items()},
         **({} if found.verdict is None else {"validation": found.verdict.document()}),
-        **budget,
+        **breakdown,
         "ceiling_parameters": evaluation.ceiling_parameters.as_dict(),
         "per_view": evaluation.per_view(),
         "notes": list(notes),
@@ -177,9 +177,10 @@ class _Found:
 
     status: Outcome
     sentence: str
-    parameters: ArtistParameters
-    start: ArtistParameters
-    """The start at the cost of what was found: what `default` has to be compared at."""
+    config: TunedConfig
+    """What was found or kept, without provenance."""
+    start: TunedConfig
+    """The start at the cost of what was found: its VPL count and quality are those of `config`."""
     descent: Descent
     known: dict[str, Any] = field(default_factory=dict)
     verdict: Verdict | None = None
@@ -192,7 +193,7 @@ class _Found:
 def _unlit(start: TunedConfig) -> _Found:
     point = SearchSpace().point(start.parameters)
     descent = Descent(point, float("nan"), float("nan"), np.array([np.nan]), FitStatus.NOTHING_LIT)
-    return _Found("unlit", descent.status.value, start.parameters, start.parameters, descent)
+    return _Found("unlit", descent.status.value, start, start, descent)
 
 
 def _judged(
@@ -214,19 +215,27 @@ def _judged(
             seed=options.seed,
             progress=lambda share: progress("fit", share),
         )
-    baseline = replace(start.parameters, vpl_count=found.tuned.vpl_count)
+    baseline = replace(
+        start,
+        parameters=replace(start.parameters, vpl_count=found.tuned.vpl_count),
+        quality=found.quality,
+    )
     with watch.stage("validate"):
         chosen, doubt = _validated(prepared, baseline, found, options, progress)
     if found.descent.status is FitStatus.NOT_FINITE:
         doubt = (*doubt, "the loss at the start is not a finite number")
     status: Outcome
     if doubt:
-        status, sentence, parameters = "doubtful", f"{'; '.join(doubt)}; the start is kept", baseline
+        status, sentence, parameters = (
+            "doubtful",
+            f"{'; '.join(doubt)}; the start is kept",
+            baseline.parameters,
+        )
     elif chosen is not None and chosen.chosen is not None:
         status, sentence, parameters = "improved", chosen.sentence, chosen.chosen.parameters
     else:
         assert chosen is not None, "nothing is in doubt, so the candidates were judged"
-        status, sentence, parameters = "kept", chosen.sentence, baseline
+        status, sentence, parameters = "kept", chosen.sentence, baseline.parameters
     # An interval says where the fitted views have their optimum; validation may choose a value beside it.
     known = {
         name: replace(interval, value=float(getattr(parameters, name)))
@@ -238,7 +247,7 @@ def _judged(
     return _Found(
         status,
         sentence,
-        parameters,
+        baseline.with_parameters(parameters),
         baseline,
         found.descent,
         known,
@@ -251,21 +260,21 @@ def _judged(
 
 def _validated(
     prepared: PreparedScene,
-    start: ArtistParameters,
+    start: TunedConfig,
     found: Search,
     options: FitOptions,
     progress: Progress,
 ) -> tuple[Verdict | None, tuple[str, ...]]:
     """What the validation views choose, and what speaks against judging by them."""
     auto = _auto_candidate(prepared, start, options)
-    tried = candidates(start, found.base, found.tuned, auto)
+    tried = candidates(start.parameters, found.base, found.tuned, auto)
     # The first is what the runtime draws with; the others are not those that a density was fitted to.
     rotations = table_rotations(VALIDATION_ROTATIONS - 1, options.seed, held_out=True)
     few = options.density or options.budget is not None
     metrics, captured = validation_metrics(
         prepared.runtime,
         prepared.validation,
-        {"start": start, **tried},
+        {"start": start, **{name: start.with_parameters(each) for name, each in tried.items()}},
         ((0.0, 0.0), *rotations) if few else ((0.0, 0.0),),
         motion=options.motion,
         progress=lambda share: progress("validate", share),
@@ -282,54 +291,64 @@ def _validated(
 
 def _prior_metrics(prepared: PreparedScene, start: TunedConfig) -> list[ViewMetrics]:
     """The start's own, where a prior sets its parameters anew in each validation view."""
-    runtime = Runtime(prepared.scene, start, context=prepared.runtime.context)
-    drawn = [CapturedView(view, reference, runtime.capture(view)) for view, reference in prepared.validation]
+    runtime = prepared.runtime
+    drawn = [
+        CapturedView(view, reference, runtime.capture(view, start, maps=False))
+        for view, reference in prepared.validation
+    ]
     return [view.metrics(view.captured.indirect_irradiance) for view in drawn if view.lit]
 
 
 def _auto_candidate(
-    prepared: PreparedScene, start: ArtistParameters, options: FitOptions
+    prepared: PreparedScene, start: TunedConfig, options: FitOptions
 ) -> ArtistParameters | None:
     """What the shipped prior sets at the start's placement, the mean over the fitted views in the unit cube.
 
     None where it was not trained for it: with clustered discs, or without maps.
     """
-    if start.lloyd_iterations > 0 or options.start.visibility != "maps" or options.start.auto is not None:
+    parameters = start.parameters
+    if (
+        parameters.lloyd_iterations > 0
+        or options.start.visibility != "maps"
+        or options.start.auto is not None
+    ):
         return None
     prior = read_config("auto").auto
     statistics = [
         view.statistics
         for view in prepared.views
-        if view.view.split == "fitted" and view.statistics is not None and view.drawn_with == start
+        if view.view.split == "fitted"
+        and view.statistics is not None
+        and view.drawn_with is not None
+        and view.drawn_with.parameters == parameters
     ]
     if prior is None or not statistics:
         return None
-    return _mean_parameters(start, [prior.parameters(each.astype(np.float64), start) for each in statistics])
+    set_by_view = [prior.parameters(each.astype(np.float64), parameters) for each in statistics]
+    return _mean_parameters(parameters, set_by_view)
 
 
 def _evaluated(prepared: PreparedScene, found: _Found, options: FitOptions, progress: Progress) -> Evaluation:
     """Default, tuned and ceiling in the fitted and the held-out views."""
-    tuned = found.parameters
+    tuned = found.config
     known = (*prepared.views, *found.captured)
     views = []
     for view in prepared.views:
         same = [
             each
             for each in known
-            if each.view is view.view
-            and each.drawn_with is not None
-            and placement(each.drawn_with) == placement(tuned)
+            if each.view is view.view and each.drawn_with is not None and _same_vpls(each.drawn_with, tuned)
         ]
         if not same:
-            prepared.runtime.parameters = tuned
-            same = list(capture_views(prepared.runtime, (view.view,), (view.reference,)))
+            same = list(capture_views(prepared.runtime, tuned, (view.view,), (view.reference,)))
         views.append(same[0])
     kept_prior = _keeps_prior(found, options)
+    default = default_like(options.start.parameters)
     return evaluate(
         prepared.scene,
         prepared.runtime,
         prepared.views if kept_prior else tuple(views),
-        replace(default_like(options.start.parameters), vpl_count=tuned.vpl_count),
+        tuned.with_parameters(replace(default, vpl_count=tuned.parameters.vpl_count)),
         None if kept_prior else tuned,
         seed=options.seed,
         known=known,
@@ -337,11 +356,17 @@ def _evaluated(prepared: PreparedScene, found: _Found, options: FitOptions, prog
     )
 
 
+def _same_vpls(first: TunedConfig, second: TunedConfig) -> bool:
+    """Whether two configs draw the same VPLs and visibility maps."""
+    return (
+        placement(first.parameters) == placement(second.parameters)
+        and first.visibility == second.visibility
+        and replace(first.quality, interleave=1) == replace(second.quality, interleave=1)
+    )
+
+
 def fit_start(config: TunedConfig, drawn: Sequence[ArtistParameters]) -> ArtistParameters:
-    """The config's parameters; of a prior, the mean in the unit cube of what views were drawn with."""
-    if config.visibility == "none":
-        # What the runtime does not look at shall not look as if it did.
-        return replace(config.parameters, extinction_coefficient=0.0)
+    """The config's parameters; with a prior, the mean in the unit cube of what views were drawn with."""
     return config.parameters if config.auto is None else _mean_parameters(config.parameters, drawn)
 
 
@@ -350,7 +375,7 @@ def _mean_parameters(rest: ArtistParameters, drawn: Sequence[ArtistParameters]) 
     values = {}
     for name in AUTO_PARAMETERS:
         spec = parameter_spec(name)
-        values[name] = value_at(spec, fmean(place_of(spec, getattr(each, name)) for each in drawn))
+        values[name] = spec.within(fmean(spec.place_of(getattr(each, name)) for each in drawn))
     return replace(rest, **values)
 
 
@@ -362,7 +387,8 @@ def default_like(start: ArtistParameters) -> ArtistParameters:
 
 def _keeps_prior(found: _Found, options: FitOptions) -> bool:
     """Whether the start was kept, and has a prior; a budget's start is what the prior set on average."""
-    return found.parameters == found.start and options.start.auto is not None and options.budget is None
+    kept = found.config.draws_as(found.start)
+    return kept and options.start.auto is not None and options.budget is None
 
 
 def _config(prepared: PreparedScene, found: _Found, options: FitOptions) -> TunedConfig:
@@ -375,9 +401,6 @@ def _config(prepared: PreparedScene, found: _Found, options: FitOptions) -> Tune
         "views": options.views,
         "seed": options.seed,
         "bounces": options.bounces,
-        "status": found.status,
-        "fit": found.sentence,
     }
-    if _keeps_prior(found, options):
-        return replace(options.start, provenance=provenance)
-    return TunedConfig(found.parameters, provenance, options.start.visibility)
+    chosen = options.start if _keeps_prior(found, options) else found.config
+    return replace(chosen, provenance=provenance, fit=FitNote(found.status, found.sentence))

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene
 from vpltune.tuner.fitting.choose_placement import choose_placement
@@ -13,7 +14,7 @@ from vpltune.tuner.fitting.fit_density import density_document, fit_density, wit
 from vpltune.tuner.fitting.fit_placement import fit_placement, ready_views
 from vpltune.tuner.fitting.fit_status import Descent
 from vpltune.tuner.fitting.fit_views import robust_errors
-from vpltune.tuner.fitting.search_space import SearchSpace, held_for
+from vpltune.tuner.fitting.search_space import SearchSpace
 from vpltune.tuner.fitting.uncertainty import Interval, fit_with_intervals, open_intervals
 from vpltune.tuner.frame_time.fit_budget import BudgetOptions, fit_to_budget
 from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
@@ -26,6 +27,8 @@ class Search:
     base: ArtistParameters
     """The tuned placement with the falloff and visibility that its fit began with."""
     tuned: ArtistParameters
+    quality: Quality
+    """The start's, or what meets the budget."""
     descent: Descent
     known: dict[str, Interval]
     """What is known of each falloff parameter."""
@@ -56,28 +59,27 @@ def search(
     """
     views = tuple(view for view in prepared.views if view.view.split == "fitted" and view.lit)
     if budget is not None:
-        tuned, descent, found = fit_to_budget(prepared, start, budget, output, seed=seed, progress=progress)
-        return _recaptured(prepared, views, start, tuned, descent, found, seed)
+        met, descent, found = fit_to_budget(prepared, start, budget, output, seed=seed, progress=progress)
+        start = replace(start, quality=met.quality)
+        return _recaptured(prepared, views, start, met.parameters, descent, found, seed)
     if density:
-        fit = fit_density(prepared.runtime, views, start.parameters, seed=seed, progress=progress)
-        found = {"density": density_document(prepared.runtime, views, start.parameters, fit, seed)}
+        fit = fit_density(prepared.runtime, views, start, seed=seed, progress=progress)
+        found = {"density": density_document(prepared.runtime, views, start, fit, seed)}
         return _recaptured(prepared, views, start, fit.parameters, fit.descent, found, seed)
     errors = robust_errors(views, seed=seed)
     placed = choose_placement(
         prepared.runtime,
         views,
-        start.parameters,
+        start,
         errors,
         seed=seed,
         progress=lambda share: progress(0.6 * share),
     )
-    held = held_for(start.visibility)
     fit = fit_placement(
         placed.views,
         placed.parameters,
         errors,
         seed=seed,
-        held=held,
         progress=lambda share: progress(0.6 + 0.3 * share),
     )
     prior = replace(
@@ -85,9 +87,17 @@ def search(
         visibility_bias=fit.parameters.visibility_bias,
         visibility_softness=fit.parameters.visibility_softness,
     )
-    tuned, _, known = fit_with_intervals(fit.views, prior, held=held)
+    tuned, _, known = fit_with_intervals(fit.views, prior)
     progress(1.0)
-    return Search(placed.parameters, tuned, fit.descent, known, placed.views, {"placements": placed.costs})
+    return Search(
+        placed.parameters,
+        tuned,
+        start.quality,
+        fit.descent,
+        known,
+        placed.views,
+        {"placements": placed.costs},
+    )
 
 
 def _recaptured(
@@ -109,13 +119,16 @@ def _recaptured(
     if tuned.lloyd_iterations > 0:
         # Discs begin at α = 1, whatever the start's points had; a start with discs keeps its α.
         base = replace(with_discs(base), lloyd_iterations=tuned.lloyd_iterations)
-    prepared.runtime.parameters = tuned
     captured = capture_views(
-        prepared.runtime, tuple(view.view for view in views), tuple(view.reference for view in views)
+        prepared.runtime,
+        start.with_parameters(tuned),
+        tuple(view.view for view in views),
+        tuple(view.reference for view in views),
     )
     if descent.status.nothing_fitted:
-        return Search(base, tuned, descent, {}, captured, found)
+        return Search(base, tuned, start.quality, descent, {}, captured, found)
     # One rotation a view: several of one view err together, and would count as independent witnesses.
     ready = ready_views(captured, tuned, robust_errors(captured, seed=seed), seed=seed)
-    names = frozenset(SearchSpace().names) - held_for(start.visibility)
-    return Search(base, tuned, descent, open_intervals(ready, tuned, names, base), captured, found)
+    names = frozenset(SearchSpace().names)
+    known = open_intervals(ready, tuned, names, base)
+    return Search(base, tuned, start.quality, descent, known, captured, found)

@@ -37,23 +37,6 @@ def budget_from_flags(
     return BudgetOptions(budget_ms, pareto, None if frame_size is None else parse_size(frame_size))
 
 
-def render_flags(document: Mapping[str, Any]) -> list[str]:
-    """What `vpltune render` needs to be told to draw tuned.json as the budget's frames were.
-
-    Without a budget that is the front's last point.
-    """
-    fits = [document["budget"]] if "budget" in document else document.get("pareto", [])
-    if not fits:
-        return []
-    choice, frame_size = fits[-1]["choice"], fits[-1]["frame_size"]
-    return [
-        f"--interleave={choice['interleave']}",
-        f"--map-size={choice['visibility_map_size']}",
-        f"--rsm-resolution={choice['rsm_resolution']}",
-        "--size={}x{}".format(*frame_size),
-    ]
-
-
 def budget_lines(document: Mapping[str, Any]) -> tuple[Any, ...]:
     """What `vpltune fit` shows of density, budget and front."""
     lines: list[Any] = []
@@ -88,7 +71,7 @@ def _front_table(points: list[Mapping[str, Any]]) -> Any:
             f"{point['relmse']:.3g}",
             str(point["vpl_count"]),
             str(choice["interleave"]),
-            str(choice["visibility_map_size"]),
+            str(choice["map_size"]),
             str(choice["rsm_resolution"]),
             point["config"],
         )

@@ -55,6 +55,9 @@ def export(
     visibility: VisibilityOption = None,
     views: ViewsFileOption = None,
     view: ViewNameOption = None,
+    renew_checksum: Annotated[
+        bool, typer.Option("--renew-checksum", help="json: accept a file that was edited by hand.")
+    ] = False,
     *,
     flags: ViewFlags,
     json: JsonOption = False,
@@ -62,6 +65,7 @@ def export(
     """Write a config for another program: as text, as bytes, into a glTF scene, or with a scene to draw."""
     from rich.markup import escape
 
+    from vpltune.cli.quality_flags import with_flags
     from vpltune.renderer.config.tuned_config import read_config
 
     if to in WITH_SCENE and scene is None:
@@ -74,7 +78,10 @@ def export(
         )
     if to == "web" and output.suffix.lower() != ".html":
         raise InputError(f"{output}: the file name must end in .html, got {output.suffix or 'no suffix'!r}")
-    config = read_config(file).seen_by(visibility)
+    if renew_checksum and to != "json":
+        raise InputError(f"--renew-checksum: goes with --to json, got --to {to}")
+    config, overridden = with_flags(read_config(file, check=not renew_checksum), visibility=visibility)
+    warn(overridden)
     fit = fit_outcome(config)
     warn(fit_warnings(config))
     if to in WITH_VIEW:
@@ -99,18 +106,15 @@ def export(
 
 def fit_outcome(config: "TunedConfig") -> str | None:
     """How the fit that wrote the config ended; None where no fit did, or does not say."""
-    status = config.provenance.get("status")
-    return status if isinstance(status, str) else None
+    return None if config.fit is None else config.fit.status
 
 
 def fit_warnings(config: "TunedConfig") -> tuple[str, ...]:
     """A sentence where what is exported is not better than the start of its fit."""
-    status = fit_outcome(config)
-    if status in (None, "improved"):
+    fit = config.fit
+    if fit is None or fit.status == "improved":
         return ()
-    return (
-        f"this config is from a fit that ended {status}: {config.provenance.get('fit', 'no reason given')}",
-    )
+    return (f"this config is from a fit that ended {fit.status}: {fit.sentence or 'no reason given'}",)
 
 
 def _write(config: "TunedConfig", to: Form, output: Path, scene: Path | None) -> None:

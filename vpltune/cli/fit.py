@@ -102,12 +102,14 @@ def fit(
 def _report(document: dict, output: Path) -> Report:
     from rich.markup import escape
 
-    from vpltune.cli.budget_flags import budget_lines, render_flags
+    from vpltune.cli.budget_flags import budget_lines
     from vpltune.cli.metrics_table import error_breakdown_table, metrics_table, parameters_table
 
     config, image = output / "tuned.json", output / "tuned.png"
     command = ["vpltune", "render", document["scene"], "--config", str(config), "-o", str(image)]
-    command += render_flags(document)
+    budget = document["quality"].get("budget")
+    if budget is not None:
+        command += ["--size", "{}x{}".format(*budget["frame_size"])]
     shown = (
         parameters_table(document["parameters"], document["uncertainty"]),
         metrics_table(document["metrics"]),

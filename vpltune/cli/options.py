@@ -35,8 +35,41 @@ JsonOption = Annotated[
     bool, typer.Option("--json", help="Print one JSON object on stdout, everything else on stderr.")
 ]
 VisibilityOption = Annotated[
-    Literal["none", "transmittance", "maps"] | None,
-    typer.Option(help="What stands for occluders of VPLs; else what the config says.", show_default=False),
+    Literal["transmittance", "maps"] | None,
+    typer.Option(help="What occludes VPLs; overrides the config.", show_default=False),
+]
+InterleaveOption = Annotated[
+    int | None,
+    typer.Option(
+        metavar="1|2|4|8",
+        help="Blocks of NxN pixels share the VPLs out: faster above 1; overrides the config.",
+        show_default=False,
+    ),
+]
+MapSizeOption = Annotated[
+    int | None,
+    typer.Option(
+        metavar="TEXELS",
+        help="Side of a VPL's visibility map, from 4 to 64; overrides the config.",
+        show_default=False,
+    ),
+]
+MapRefinementOption = Annotated[
+    int | None,
+    typer.Option(
+        metavar="1|2|4|8",
+        help="How many times finer maps are at silhouettes; overrides the config.",
+        show_default=False,
+    ),
+]
+RsmResolutionOption = Annotated[
+    int | None,
+    typer.Option(
+        metavar="TEXELS",
+        help="Side of a face of a light's map, which VPLs and shadows come from, from 64 to 8192; overrides "
+        "the config.",
+        show_default=False,
+    ),
 ]
 StartOption = Annotated[
     str,

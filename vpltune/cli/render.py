@@ -7,9 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vpltune.cli.options import (
+    InterleaveOption,
     JsonOption,
     Layer,
+    MapRefinementOption,
+    MapSizeOption,
     Motion,
+    RsmResolutionOption,
     SceneArgument,
     VisibilityOption,
     checked_scale,
@@ -26,15 +30,15 @@ from vpltune.cli.view_options import (
 from vpltune.renderer.errors import InputError
 
 if TYPE_CHECKING:
+    from vpltune.renderer.config.artist_parameters import ArtistParameters
+    from vpltune.renderer.config.tuned_config import TunedConfig
     from vpltune.renderer.frame.runtime import Runtime
     from vpltune.renderer.scene.light_motion import BouncingLights
     from vpltune.renderer.scene.scene import Scene
     from vpltune.renderer.scene.views import View
 
 LARGEST_DYNAMIC_LIGHT_COUNT = 1_000_000
-"""The largest number that `--dynamic-lights` takes."""
 DYNAMIC_LIGHT_SEED = 0
-"""The seed of their places and directions: one command draws one image."""
 
 
 @takes_view_flags
@@ -55,35 +59,10 @@ def render(
     layer: Annotated[Layer, typer.Option(help="Which image to draw.")] = "final",
     size: ImageSizeOption = None,
     visibility: VisibilityOption = None,
-    interleave: Annotated[
-        int, typer.Option(metavar="1|2|4|8", help="Blocks of NxN pixels share the VPLs out: faster above 1.")
-    ] = 1,
-    map_size: Annotated[
-        int | None,
-        typer.Option(
-            metavar="TEXELS",
-            min=4,
-            max=64,
-            help="Along the side of a VPL's visibility map. [24]",
-            show_default=False,
-        ),
-    ] = None,
-    map_refinement: Annotated[
-        int | None,
-        typer.Option(
-            metavar="1|2|4|8", help="How many times finer maps are at silhouettes. [4]", show_default=False
-        ),
-    ] = None,
-    rsm_resolution: Annotated[
-        int | None,
-        typer.Option(
-            metavar="TEXELS",
-            min=64,
-            max=8192,
-            help="Along the side of a light's map of shadows and VPLs. [1024; 512 for point lights]",
-            show_default=False,
-        ),
-    ] = None,
+    interleave: InterleaveOption = None,
+    map_size: MapSizeOption = None,
+    map_refinement: MapRefinementOption = None,
+    rsm_resolution: RsmResolutionOption = None,
     dynamic_lights: Annotated[
         int,
         typer.Option(
@@ -106,11 +85,11 @@ def render(
 ) -> Report:
     """Draw a scene with a config, headless."""
     from vpltune.cli.chosen_view import chosen_view
+    from vpltune.cli.quality_flags import with_flags
     from vpltune.cli.render_clip import write_clip
     from vpltune.renderer.config.tuned_config import read_config
     from vpltune.renderer.files.image_file import require_extension
     from vpltune.renderer.files.video_file import check_clip_path
-    from vpltune.renderer.frame.runtime_options import INTERLEAVES, REFINEMENTS
 
     # All that can be refused is refused before the scene is read.
     chosen = chosen_view(views, view, size, flags)
@@ -121,14 +100,17 @@ def render(
     if not (math.isfinite(fps) and 0.1 <= fps <= 1000.0):
         raise InputError(f"--fps: must lie in [0.1, 1000], got {fps}")
     factor = checked_scale(scale)
-    if interleave not in INTERLEAVES:
-        raise InputError(f"--interleave: must be one of {INTERLEAVES}, got {interleave}")
-    if map_refinement is not None and map_refinement not in REFINEMENTS:
-        raise InputError(f"--map-refinement: must be one of {REFINEMENTS}, got {map_refinement}")
-    tuned = read_config(config).seen_by(visibility)
+    tuned, overridden = with_flags(
+        read_config(config),
+        visibility=visibility,
+        interleave=interleave,
+        map_size=map_size,
+        map_refinement=map_refinement,
+        rsm_resolution=rsm_resolution,
+    )
+    warn(overridden)
 
     from vpltune.renderer.frame.runtime import Runtime
-    from vpltune.renderer.frame.runtime_options import RuntimeOptions
     from vpltune.renderer.scene.files import read_scene
     from vpltune.renderer.scene.scene import scaled
     from vpltune.renderer.scene.sequence import Sequence
@@ -140,22 +122,16 @@ def render(
     sequence = Sequence(loaded, drawn, motion, factor)
     if factor != 1.0:
         loaded, drawn = scaled(loaded, factor), scaled_view(drawn, factor)
-    options = RuntimeOptions(
-        interleave=interleave,
-        visibility_map_size=map_size or RuntimeOptions.visibility_map_size,
-        visibility_map_refinement=map_refinement or RuntimeOptions.visibility_map_refinement,
-        # A clip is eased over a quarter of a second; a still takes what it asks for.
-        adaptation_frames=0.0 if frames is None else fps / 4.0,
-    )
-    runtime = Runtime(loaded, tuned, options, rsm_resolution=rsm_resolution)
+    runtime = Runtime(loaded)
     detail(f"OpenGL on {runtime.opengl_renderer}")
     bouncing = _bouncing_lights(loaded, drawn, dynamic_lights)
     if frames is None:
-        _write_layer(runtime, drawn, layer, output, bouncing)
+        parameters = _write_layer(runtime, tuned, drawn, layer, output, bouncing)
     else:
-        write_clip(runtime, sequence, layer, output, frames, fps, bouncing)
+        parameters = None
+        write_clip(runtime, tuned, sequence, layer, output, frames, fps, bouncing)
     clip = {} if frames is None else {"frames": frames, "fps": fps}
-    return _report(scene, output, layer, runtime.drawn_parameters().as_dict(), drawn, clip)
+    return _report(scene, output, layer, (parameters or tuned.parameters).as_dict(), drawn, clip)
 
 
 def _bouncing_lights(scene: "Scene", view: "View", count: int) -> "BouncingLights | None":
@@ -167,8 +143,14 @@ def _bouncing_lights(scene: "Scene", view: "View", count: int) -> "BouncingLight
 
 
 def _write_layer(
-    runtime: "Runtime", view: "View", layer: Layer, output: Path, bouncing: "BouncingLights | None"
-) -> None:
+    runtime: "Runtime",
+    config: "TunedConfig",
+    view: "View",
+    layer: Layer,
+    output: Path,
+    bouncing: "BouncingLights | None",
+) -> "ArtistParameters":
+    """Write one image; returns the parameters that it was drawn with."""
     from vpltune.cli.layer_display import for_display
     from vpltune.renderer.files.image_file import write_exr, write_png
     from vpltune.renderer.scene.dynamic_lights import DynamicLights
@@ -177,13 +159,17 @@ def _write_layer(
     if output.suffix.lower() == ".exr":
         # The final image without its tone curve is the radiance that reaches the eye.
         pixels = (
-            runtime.render_radiance(view, lights)
+            runtime.render_radiance(view, config, lights=lights)
             if layer == "final"
-            else runtime.render(view, layer, lights=lights)
+            else runtime.render(view, config, layer=layer, lights=lights)
         )
         write_exr(output, pixels, "Z" if layer == "depth" else "Y")
     else:
-        write_png(output, for_display(runtime, layer, runtime.render(view, layer, lights=lights)))
+        pixels = runtime.render(view, config, layer=layer, lights=lights)
+        write_png(output, for_display(runtime, layer, pixels))
+    if config.auto is None:
+        return config.parameters
+    return runtime.draw(view, config, lights=lights).read_parameters()
 
 
 def _report(

@@ -7,17 +7,19 @@ import numpy as np
 from vpltune.cli.layer_display import for_display
 from vpltune.cli.options import Layer
 from vpltune.cli.progress_display import shown_progress
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.video_file import clip_writer
+from vpltune.renderer.frame.clip_state import ClipState
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.dynamic_lights import DynamicLights
 from vpltune.renderer.scene.light_motion import BouncingLights
 from vpltune.renderer.scene.sequence import Sequence
-
-_EXPOSED = ("final", "direct", "indirect", "irradiance")
+from vpltune.renderer.scene.views import View
 
 
 def write_clip(
     runtime: Runtime,
+    config: TunedConfig,
     sequence: Sequence,
     layer: Layer,
     output: Path,
@@ -26,23 +28,34 @@ def write_clip(
     bouncing: BouncingLights | None,
 ) -> None:
     """Write the frames at times 0, 1/fps, 2/fps, …; all have the exposure of the first."""
+    state = ClipState()
     lights = None if bouncing is None else DynamicLights(bouncing.records)
-    exposure = None
-    size = sequence.at(0.0).view.size
-    with shown_progress() as progress, clip_writer(output, size, fps) as write:
+    first = sequence.at(0.0)
+    runtime.pose(first.pose)
+    exposure = _exposure(runtime, config, first.view, layer, lights)
+    with shown_progress() as progress, clip_writer(output, first.view.size, fps) as write:
         for frame in range(frame_count):
             progress("frames", frame / frame_count)
             moment = sequence.at(frame / fps)
             runtime.pose(moment.pose)
-            pixels = runtime.render(moment.view, layer, exposure, lights)
+            pixels = runtime.render(moment.view, config, state, layer=layer, exposure=exposure, lights=lights)
             shown = for_display(runtime, layer, pixels, exposure)
             write(shown if shown.dtype == np.uint8 else _bytes(shown))
-            if exposure is None and layer in _EXPOSED:
-                exposure = runtime.exposure()
             if bouncing is not None and lights is not None:
                 bouncing.advance(1.0 / fps)
                 lights.update(bouncing.records)
         progress("frames", 1.0)
+
+
+def _exposure(
+    runtime: Runtime, config: TunedConfig, view: View, layer: Layer, lights: DynamicLights | None
+) -> float | None:
+    """The exposure that a view would be shown with; None for layers that are not exposed."""
+    if layer == "final":
+        return runtime.draw(view, config, lights=lights).read_exposure()
+    if layer in ("direct", "indirect", "irradiance"):
+        return runtime.measured_exposure(runtime.render(view, config, layer=layer, lights=lights))
+    return None
 
 
 def _bytes(image: np.ndarray) -> np.ndarray:

@@ -1,38 +1,38 @@
 """Direct light: the light pre-pass's sum, and the punctual lights with shadows from their RSMs."""
 
-import moderngl
+from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
+from vpltune.renderer.gpu.gpu_program import ComputeProgram
+from vpltune.renderer.gpu.render_targets import (
+    GBUFFER_READS,
+    RSM_READS,
+    ReflectiveShadowMap,
+    pixel_groups,
+)
+from vpltune.renderer.gpu.resources import Resources
 
-from vpltune.renderer.gpu import buffer_bindings
-from vpltune.renderer.gpu.camera_uniforms import CameraUniforms
-from vpltune.renderer.gpu.render_targets import GBuffer, LightAccumulation, ReflectiveShadowMap
-from vpltune.renderer.gpu.shader_library import load_compute, set_uniforms
 
-
-class DirectLightPass:
+class DirectLightPass(FramePass):
     """G-buffer, RSM, light accumulation → direct irradiance."""
 
-    def __init__(self, context: moderngl.Context, rsm_resolution: int):
-        self._context = context
-        defines = {**buffer_bindings.DEFINES, "RSM_RESOLUTION": rsm_resolution}
-        self._program = load_compute(context, "direct_light/direct_light", defines)
+    name = "direct_light"
 
-    def draw(
-        self,
-        camera: CameraUniforms,
-        gbuffer: GBuffer,
-        rsm: ReflectiveShadowMap,
-        light_count: int,
-        accumulated: LightAccumulation | None,
-        direct_irradiance: moderngl.Texture,
-    ) -> None:
-        camera.bind_gbuffer(self._program, gbuffer, 0)
-        rsm.bind(self._program, 2)
-        set_uniforms(self._program, light_count=light_count, light_accumulation=5)
-        if accumulated is None:
-            set_uniforms(self._program, accumulation_unit=0.0)
-        else:
-            accumulated.texture.use(5)
-            set_uniforms(self._program, accumulation_unit=accumulated.unit)
-        direct_irradiance.bind_to_image(0, read=False, write=True)
-        self._program.run(-(-direct_irradiance.width // 8), -(-direct_irradiance.height // 8))
-        self._context.memory_barrier(self._context.TEXTURE_FETCH_BARRIER_BIT)
+    def __init__(self, resources: Resources, rsm: ReflectiveShadowMap):
+        self._rsm = rsm
+        self._groups = pixel_groups(resources.texture("direct_irradiance"))
+        self._program = ComputeProgram(
+            resources,
+            "direct_light/direct_light",
+            {"RSM_RESOLUTION": rsm.resolution},
+            reads=(*GBUFFER_READS, *RSM_READS, "light_accumulation"),
+            writes=("direct_irradiance as irradiance",),
+        )
+
+    def draw(self, inputs: FrameInputs) -> None:
+        """Shade every pixel."""
+        self._program.dispatch(
+            *self._groups,
+            **inputs.camera.uniforms,
+            **self._rsm.uniforms,
+            light_count=inputs.light_count,
+            accumulation_unit=inputs.accumulation_unit,
+        )

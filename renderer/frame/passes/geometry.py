@@ -2,33 +2,31 @@
 
 import moderngl
 
-from vpltune.renderer.gpu import buffer_bindings
-from vpltune.renderer.gpu.camera_uniforms import CameraUniforms
+from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
+from vpltune.renderer.gpu.gpu_program import RasterProgram
 from vpltune.renderer.gpu.render_targets import GBuffer
-from vpltune.renderer.gpu.scene_buffers import SceneBuffers
-from vpltune.renderer.gpu.shader_library import load_program, set_uniforms
+from vpltune.renderer.gpu.resources import Resources
+from vpltune.renderer.gpu.scene_buffers import SCENE_READS, SceneBuffers
 
 
-class GeometryPass:
+class GeometryPass(FramePass):
     """Scene, camera → G-buffer (depth, shading normal, albedo)."""
 
-    def __init__(self, context: moderngl.Context, scene: SceneBuffers):
-        self._context = context
-        self._scene = scene
-        self._program = load_program(context, "geometry/geometry", buffer_bindings.DEFINES)
-        self._vertex_array = scene.vertex_array(self._program)
+    name = "geometry"
 
-    def draw(self, camera: CameraUniforms, gbuffer: GBuffer) -> None:
-        gbuffer.framebuffer.use()
-        gbuffer.framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=0.0)
+    def __init__(self, resources: Resources, scene: SceneBuffers, gbuffer: GBuffer):
+        self._context = resources.context
+        self._scene = scene
+        self._gbuffer = gbuffer
+        self._program = RasterProgram(resources, "geometry/geometry", reads=SCENE_READS)
+        self._vertex_array = scene.vertex_array(self._program.program)
+
+    def draw(self, inputs: FrameInputs) -> None:
+        """Fill the G-buffer."""
+        framebuffer = self._gbuffer.framebuffer
+        framebuffer.use()
+        framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=0.0)
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = ">"
-        set_uniforms(
-            self._program,
-            world_to_camera=camera.world_to_camera,
-            tan_half_fov=camera.tan_half_fov,
-            near_plane=camera.near_plane,
-            eye_world=camera.eye_world,
-            base_color_texture=0,
-        )
-        self._scene.draw(self._vertex_array)
+        self._program.bind(**inputs.camera.uniforms)
+        self._scene.draw(self._program, self._vertex_array)

@@ -1,11 +1,11 @@
 """Geometry-aware reconstruction of interleaved images (Keller and Heidrich 2001; Segovia et al. 2006)."""
 
-import moderngl
+from collections.abc import Callable
 
-from vpltune.renderer.gpu import buffer_bindings
-from vpltune.renderer.gpu.camera_uniforms import CameraUniforms
-from vpltune.renderer.gpu.render_targets import GBuffer, PixelList
-from vpltune.renderer.gpu.shader_library import load_compute, set_uniforms
+from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
+from vpltune.renderer.gpu.gpu_program import ComputeProgram
+from vpltune.renderer.gpu.render_targets import EMPTY_DISPATCH, GBUFFER_READS, pixel_groups
+from vpltune.renderer.gpu.resources import Resources
 
 PLANE_TOLERANCE = 1.0
 """Pixel footprints that a neighbour may stand off a pixel's plane and still be on its surface."""
@@ -26,72 +26,90 @@ LARGEST_ERROR_IN_SHADOW = 0.05
 its subsets tell."""
 
 
-class InterleavedFilterPass:
-    """G-buffer, interleaved image → irradiance, and with `refine` the list of pixels it does not serve.
+class InterleavedFilterPass(FramePass):
+    """G-buffer, `shared_irradiance`, `shared_direction` → `vpl_irradiance`, and the list of pixels that need
+    a full gather.
 
-    With `relight`, the image comes with the directions of its light, and neighbours count as if they had a
-    pixel's normal; `shadowed` tells that visibility maps took part. With `add_base`, another irradiance
-    image is added to the result.
+    Neighbours count as if they had a pixel's normal. `shadowed` tells that visibility maps took part.
     """
 
+    name = "interleaved_filter"
+
+    def __init__(self, resources: Resources, interleave: int, *, shadowed: bool):
+        self._resources = resources
+        self._filter = _Filter(
+            resources,
+            interleave,
+            reads=("shared_irradiance as interleaved", "shared_direction as direction"),
+            target="vpl_irradiance",
+            relight=True,
+            refine=True,
+            largest_error=LARGEST_ERROR_IN_SHADOW if shadowed else LARGEST_ERROR,
+        )
+
+    def draw(self, inputs: FrameInputs) -> None:
+        """Join the neighbours' shares."""
+        self._resources.write("pixel_list", EMPTY_DISPATCH)
+        self._filter.draw(inputs)
+
+
+class NearFieldFilterPass(FramePass):
+    """G-buffer, `shared_irradiance`, `vpl_irradiance` → `near_field_irradiance`, their sum."""
+
+    name = "screen_space_filter"
+
+    def __init__(self, resources: Resources, block: int, wanted: Callable[[FrameInputs], bool]):
+        self._near_field_wanted = wanted
+        self._filter = _Filter(
+            resources,
+            block,
+            reads=("shared_irradiance as interleaved", "vpl_irradiance as base"),
+            target="near_field_irradiance",
+            add_base=True,
+        )
+
+    def wanted(self, inputs: FrameInputs) -> bool:
+        """Where there is a near field to filter."""
+        return self._near_field_wanted(inputs)
+
+    def draw(self, inputs: FrameInputs) -> None:
+        """Join the neighbours' shares."""
+        self._filter.draw(inputs)
+
+
+class _Filter:
     def __init__(
         self,
-        context: moderngl.Context,
+        resources: Resources,
         interleave: int,
         *,
-        refine: bool = False,
+        reads: tuple[str, ...],
+        target: str,
         relight: bool = False,
-        shadowed: bool = False,
+        refine: bool = False,
         add_base: bool = False,
+        largest_error: float = LARGEST_ERROR,
     ):
-        self._context = context
-        defines = {
-            **buffer_bindings.DEFINES,
-            "INTERLEAVE": interleave,
-            "PLANE_TOLERANCE": PLANE_TOLERANCE,
-            "NORMAL_COSINE": NORMAL_COSINE,
-            "LEAST_COSINE": LEAST_COSINE,
-            "LARGEST_RELIGHTING": LARGEST_RELIGHTING,
-            "LEAST_VARIANCE": LEAST_VARIANCE,
-            "LEAST_ABSENT": LEAST_ABSENT,
-            "LARGEST_ERROR": LARGEST_ERROR_IN_SHADOW if shadowed else LARGEST_ERROR,
-            "RELIGHT": relight,
-            "REFINE": refine,
-            "ADD_BASE": add_base,
-        }
-        self._program = load_compute(context, "vpl_gather/interleaved_filter", defines)
-
-    def draw(
-        self,
-        camera: CameraUniforms,
-        gbuffer: GBuffer,
-        interleaved: moderngl.Texture,
-        irradiance: moderngl.Texture,
-        *,
-        direction: moderngl.Texture | None = None,
-        pixel_list: PixelList | None = None,
-        base: moderngl.Texture | None = None,
-    ) -> None:
-        """`pixel_list` is emptied and filled where the pass refines; `direction` is read where it relights,
-        and `base` is added where it adds."""
-        camera.bind_gbuffer(self._program, gbuffer, 0)
-        interleaved.use(2)
-        if base is not None:
-            base.use(3)
-        if direction is not None:
-            direction.use(4)
-        if pixel_list is not None:
-            pixel_list.clear()
-            pixel_list.bind()
-        set_uniforms(self._program, interleaved=2, base=3, direction=4)
-        irradiance.bind_to_image(0, read=False, write=True)
-        self._program.run(-(-irradiance.width // 8), -(-irradiance.height // 8))
-        context = self._context
-        # The listed pixels are written once more; the next frame empties the list before it is filled.
-        context.memory_barrier(
-            context.TEXTURE_FETCH_BARRIER_BIT
-            | context.SHADER_IMAGE_ACCESS_BARRIER_BIT
-            | context.SHADER_STORAGE_BARRIER_BIT
-            | context.COMMAND_BARRIER_BIT
-            | context.BUFFER_UPDATE_BARRIER_BIT
+        self._groups = pixel_groups(resources.texture(target))
+        self._program = ComputeProgram(
+            resources,
+            "vpl_gather/interleaved_filter",
+            {
+                "INTERLEAVE": interleave,
+                "PLANE_TOLERANCE": PLANE_TOLERANCE,
+                "NORMAL_COSINE": NORMAL_COSINE,
+                "LEAST_COSINE": LEAST_COSINE,
+                "LARGEST_RELIGHTING": LARGEST_RELIGHTING,
+                "LEAST_VARIANCE": LEAST_VARIANCE,
+                "LEAST_ABSENT": LEAST_ABSENT,
+                "LARGEST_ERROR": largest_error,
+                "RELIGHT": relight,
+                "REFINE": refine,
+                "ADD_BASE": add_base,
+            },
+            reads=(*GBUFFER_READS, *reads),
+            writes=(f"{target} as irradiance", "pixel_list"),
         )
+
+    def draw(self, inputs: FrameInputs) -> None:
+        self._program.dispatch(*self._groups, **inputs.camera.uniforms)

@@ -13,14 +13,16 @@ import moderngl
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from vpltune.renderer.gpu import buffer_bindings
-from vpltune.renderer.gpu.camera_uniforms import CameraUniforms
-from vpltune.renderer.gpu.render_targets import GBuffer, create_irradiance_target
-from vpltune.renderer.gpu.shader_library import load_program, set_uniforms
-from vpltune.renderer.scene.dynamic_lights import MIN_DISTANCE, DynamicLights
+from vpltune.renderer.frame.frame_pass import FrameInputs
+from vpltune.renderer.gpu.gpu_program import RasterProgram
+from vpltune.renderer.gpu.render_targets import GBUFFER_READS, create_irradiance_target
+from vpltune.renderer.gpu.resources import Resources
+from vpltune.renderer.scene.dynamic_lights import MIN_DISTANCE
 
 AZIMUTHS = 12
+"""Vertices round the axis of a cone's proxy. A choice."""
 RINGS = 2
+"""Rings of them from the axis to the rim. A choice."""
 CONE_DEFINES = {
     "AZIMUTH_COSINE": math.cos(math.pi / AZIMUTHS),
     # A facet between rings spans at most 90°/RINGS by 360°/AZIMUTHS of the unit sphere: half its diagonal is
@@ -32,20 +34,25 @@ CONE_DEFINES = {
 class LightVolumesPass:
     """G-buffer, lights → light accumulation, in two draws."""
 
-    def __init__(self, context: moderngl.Context, gbuffer: GBuffer):
-        self._context = context
-        self._gbuffer = gbuffer
-        self.light_accumulation = create_irradiance_target(context, gbuffer.depth.size)
-        self._cleared = context.framebuffer([self.light_accumulation])
-        self._framebuffer = context.framebuffer([self.light_accumulation], gbuffer.depth)
+    accumulation = "volume_light_accumulation"
+    """The resource that it writes."""
+
+    def __init__(self, resources: Resources):
+        self._context = context = resources.context
+        self._resources = resources
+        depth = resources.texture("gbuffer_depth")
+        target = resources[self.accumulation] = create_irradiance_target(context, depth.size)
+        self._cleared = context.framebuffer([target])
+        self._framebuffer = context.framebuffer([target], depth)
         # The shader reads the same depth that is tested: allowed as long as nothing writes it.
         self._framebuffer.depth_mask = False
         self._points = self._volumes(sphere_proxy(), cone=False)
         self._spots = self._volumes(cone_proxy(), cone=True)
 
-    def draw(self, camera: CameraUniforms, lights: DynamicLights) -> None:
-        """Accumulate the lights that are bound."""
-        context = self._context
+    def draw(self, inputs: FrameInputs) -> None:
+        """Accumulate the lights."""
+        context, lights = self._context, inputs.dynamic_lights
+        assert lights is not None, "a pre-pass without lights draws nothing"
         self._cleared.use()
         self._cleared.clear(0.0, 0.0, 0.0, 0.0)
         self._framebuffer.use()
@@ -54,33 +61,35 @@ class LightVolumesPass:
         context.depth_func = "<="
         context.cull_face = "front"
         context.blend_func = moderngl.ONE, moderngl.ONE
-        for volumes, first, count in (
+        for (program, volumes), first, count in (
             (self._points, 0, lights.point_count),
             (self._spots, lights.point_count, lights.spot_count),
         ):
             if not count:
                 continue
-            camera.bind_gbuffer(volumes.program, self._gbuffer, 0)
-            set_uniforms(
-                volumes.program,
-                first_light=first,
-                accumulation_unit=lights.accumulation_unit,
-                world_to_camera=camera.world_to_camera,
+            program.bind(
+                **inputs.camera.uniforms, first_light=first, accumulation_unit=lights.accumulation_unit
             )
             volumes.render(moderngl.TRIANGLES, instances=count)
 
     def _volumes(
         self, proxy: tuple[Float64[np.ndarray, "vertices 3"], Int64[np.ndarray, "triangles 3"]], cone: bool
-    ) -> moderngl.VertexArray:
+    ) -> tuple[RasterProgram, moderngl.VertexArray]:
         vertices, triangles = proxy
         context = self._context
-        defines = {**buffer_bindings.DEFINES, **CONE_DEFINES, "MIN_DISTANCE": MIN_DISTANCE, "CONE": cone}
-        return context.vertex_array(
-            load_program(context, "dynamic_lights/light_volumes", defines),
+        program = RasterProgram(
+            self._resources,
+            "dynamic_lights/light_volumes",
+            {**CONE_DEFINES, "MIN_DISTANCE": MIN_DISTANCE, "CONE": cone},
+            reads=(*GBUFFER_READS, "dynamic_lights"),
+        )
+        array = context.vertex_array(
+            program.program,
             [(context.buffer(vertices.astype("f4").tobytes()), "3f", "in_position")],
             index_buffer=context.buffer(triangles.astype("u4").tobytes()),
             index_element_size=4,
         )
+        return program, array
 
 
 def sphere_proxy() -> tuple[Float64[np.ndarray, "vertices 3"], Int64[np.ndarray, "triangles 3"]]:

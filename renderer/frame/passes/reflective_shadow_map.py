@@ -2,36 +2,44 @@
 
 import moderngl
 
-from vpltune.renderer.gpu import buffer_bindings
+from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
+from vpltune.renderer.gpu.gpu_program import RasterProgram
 from vpltune.renderer.gpu.render_targets import ReflectiveShadowMap
-from vpltune.renderer.gpu.scene_buffers import SceneBuffers
-from vpltune.renderer.gpu.shader_library import load_program, set_uniforms
+from vpltune.renderer.gpu.resources import Resources
+from vpltune.renderer.gpu.scene_buffers import SCENE_READS, SceneBuffers
+from vpltune.renderer.gpu.shader_library import set_uniforms
 
 
-class ReflectiveShadowMapPass:
+class ReflectiveShadowMapPass(FramePass):
     """Scene, light faces → RSM atlas (depth, geometric normal, reflectance)."""
 
-    def __init__(self, context: moderngl.Context, scene: SceneBuffers):
-        self._context = context
-        self._scene = scene
-        self._program = load_program(
-            context, "reflective_shadow_map/reflective_shadow_map", buffer_bindings.DEFINES
-        )
-        self._vertex_array = scene.vertex_array(self._program)
+    name = "reflective_shadow_map"
 
-    def draw(self, rsm: ReflectiveShadowMap) -> None:
-        """Fill the atlas for the lights and faces that are bound."""
-        rsm.framebuffer.use()
-        rsm.framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=0.0)
+    def __init__(self, resources: Resources, scene: SceneBuffers, rsm: ReflectiveShadowMap):
+        self._context = resources.context
+        self._scene = scene
+        self._rsm = rsm
+        self._program = RasterProgram(
+            resources,
+            "reflective_shadow_map/reflective_shadow_map",
+            reads=(*SCENE_READS, "lights", "rsm_faces"),
+        )
+        self._vertex_array = scene.vertex_array(self._program.program)
+
+    def draw(self, inputs: FrameInputs) -> None:
+        """Fill the atlas, a tile for each face."""
+        rsm, framebuffer = self._rsm, self._rsm.framebuffer
+        framebuffer.use()
+        framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=0.0)
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = ">"
-        set_uniforms(self._program, base_color_texture=0)
+        self._program.bind()
         for face in range(rsm.face_count):
             column, row = face % rsm.columns, face // rsm.columns
             tile = (column * rsm.resolution, row * rsm.resolution, rsm.resolution, rsm.resolution)
-            rsm.framebuffer.viewport = tile
-            rsm.framebuffer.scissor = tile
-            set_uniforms(self._program, face_index=face)
-            self._scene.draw(self._vertex_array)
-        rsm.framebuffer.viewport = (0, 0, *rsm.depth.size)
-        rsm.framebuffer.scissor = None
+            framebuffer.viewport = tile
+            framebuffer.scissor = tile
+            set_uniforms(self._program.program, face_index=face)
+            self._scene.draw(self._program, self._vertex_array)
+        framebuffer.viewport = (0, 0, *rsm.depth.size)
+        framebuffer.scissor = None

@@ -1,6 +1,5 @@
 """Scene statistics: ratios without units, measured of the frame's receivers and VPLs on the GPU."""
 
-import moderngl
 import numpy as np
 from jaxtyping import Float32
 
@@ -13,20 +12,20 @@ from vpltune.renderer.config.scene_statistics import (
     STRIDE,
     VPLS,
 )
+from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
 from vpltune.renderer.frame.point_table import R2_STEPS
-from vpltune.renderer.frame.visibility_map_layout import VisibilityMapLayout
-from vpltune.renderer.gpu import buffer_bindings
-from vpltune.renderer.gpu.camera_uniforms import CameraUniforms
-from vpltune.renderer.gpu.render_targets import GBuffer
-from vpltune.renderer.gpu.shader_library import load_compute, set_uniforms
+from vpltune.renderer.frame.visibility_map_layout import MAP_READS, VisibilityMapLayout
+from vpltune.renderer.gpu.gpu_program import ComputeProgram
+from vpltune.renderer.gpu.render_targets import GBUFFER_READS
+from vpltune.renderer.gpu.resources import Resources
 
 _GROUP_SIZE = 64
+"""Invocations of a workgroup. A choice."""
 _GROUPS = RECEIVERS // _GROUP_SIZE
 _SUMS_BYTES = 9 * 4
-"""Of one workgroup: `ReceiverSums` in shaders/common/scene_statistics.glsl."""
+"""Bytes of a workgroup's `ReceiverSums` in shaders/common/scene_statistics.glsl."""
 
 STATISTICS_DEFINES = {
-    **buffer_bindings.DEFINES,
     "STATISTIC_COUNT": len(STATISTIC_NAMES),
     "STATISTICS_GROUP_SIZE": _GROUP_SIZE,
     "STATISTICS_GROUPS": _GROUPS,
@@ -42,35 +41,41 @@ STATISTICS_DEFINES = {
 }
 
 
-class SceneStatisticsPass:
+class SceneStatisticsPass(FramePass):
     """G-buffer, VPLs, visibility maps → the statistics of `renderer.config.scene_statistics`.
 
-    `visibility` as in the gather; without maps all light is taken to be seen.
+    Without visibility maps all light is taken to be seen.
     """
 
-    def __init__(self, context: moderngl.Context, visibility: VisibilityMapLayout):
-        self._context = context
-        defines = {**STATISTICS_DEFINES, **visibility.defines}
-        self._sums = load_compute(context, "auto_parameters/scene_statistics", defines)
-        self._ratios = load_compute(context, "auto_parameters/scene_statistics_ratios", defines)
-        self._buffer = context.buffer(reserve=4 * len(STATISTIC_NAMES) + _GROUPS * _SUMS_BYTES)
+    name = "scene_statistics"
 
-    def draw(self, camera: CameraUniforms, gbuffer: GBuffer, vpl_count: int) -> None:
-        """Measure the frame whose VPLs are bound."""
-        self.bind()
-        camera.bind_gbuffer(self._sums, gbuffer, 0)
-        for program, groups in ((self._sums, _GROUPS), (self._ratios, 1)):
-            set_uniforms(program, vpl_count=vpl_count)
-            program.run(groups)
-            # What is measured may be read back.
-            self._context.memory_barrier(
-                self._context.SHADER_STORAGE_BARRIER_BIT | self._context.BUFFER_UPDATE_BARRIER_BIT
-            )
+    def __init__(self, resources: Resources, maps: VisibilityMapLayout):
+        self._resources = resources
+        size = 4 * len(STATISTIC_NAMES) + _GROUPS * _SUMS_BYTES
+        resources["scene_statistics"] = resources.context.buffer(reserve=size)
+        defines = {**STATISTICS_DEFINES, **maps.defines}
+        reads = ("frame_statistics", "virtual_point_lights")
+        self._sums = ComputeProgram(
+            resources,
+            "auto_parameters/scene_statistics",
+            defines,
+            reads=(*GBUFFER_READS, *reads, *(MAP_READS if maps.size else ())),
+            writes=("scene_statistics",),
+        )
+        self._ratios = ComputeProgram(
+            resources,
+            "auto_parameters/scene_statistics_ratios",
+            defines,
+            reads=reads,
+            writes=("scene_statistics",),
+        )
 
-    def bind(self) -> None:
-        """Bind what the prior reads."""
-        self._buffer.bind_to_storage_buffer(buffer_bindings.SCENE_STATISTICS)
+    def draw(self, inputs: FrameInputs) -> None:
+        """Measure the frame."""
+        uniforms = {**inputs.camera.uniforms, "vpl_count": inputs.parameters.vpl_count}
+        self._sums.dispatch(_GROUPS, **uniforms)
+        self._ratios.dispatch(1, **uniforms)
 
     def read(self) -> Float32[np.ndarray, " statistics"]:
         """The statistics in their order: waits for the GPU."""
-        return np.frombuffer(self._buffer.read(4 * len(STATISTIC_NAMES)), np.float32)
+        return np.frombuffer(self._resources.read("scene_statistics", 4 * len(STATISTIC_NAMES)), np.float32)

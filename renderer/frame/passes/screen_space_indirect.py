@@ -1,91 +1,88 @@
 """Screen-space indirect: the near field that softened VPLs withhold, from directly lit pixels nearby."""
 
-import moderngl
-
+from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
 from vpltune.renderer.frame.point_table import R2_STEPS
-from vpltune.renderer.gpu import buffer_bindings
-from vpltune.renderer.gpu.camera_uniforms import CameraUniforms
-from vpltune.renderer.gpu.render_targets import GBuffer, LightAccumulation, create_irradiance_target
-from vpltune.renderer.gpu.shader_library import load_compute, set_uniforms
+from vpltune.renderer.gpu.gpu_program import ComputeProgram
+from vpltune.renderer.gpu.render_targets import (
+    GBUFFER_READS,
+    RSM_READS,
+    ReflectiveShadowMap,
+    create_irradiance_target,
+    pixel_groups,
+)
+from vpltune.renderer.gpu.resources import Resources
 
 BLOCK = 4
 """Pixels along the side of a block that shares the samples out; its image is for the interleaved filter."""
 SAMPLES = 16
-"""Of each pixel: 256 within a block."""
+"""Samples of each pixel: 256 in a block. A choice."""
 NEAREST_PIXEL = 0.7
 """Where sampling starts, in pixels: nearer, a pixel would mostly find itself, which gives it nothing."""
 
 
-class ScreenSpaceIndirectPass:
-    """G-buffer, direct irradiance, VPLs → interleaved irradiance from nearby pixels."""
+class ScreenSpaceIndirectPass(FramePass):
+    """G-buffer, direct irradiance, VPLs → `shared_irradiance` from nearby pixels, for the filter.
 
-    def __init__(
-        self, context: moderngl.Context, size: tuple[int, int], rsm_resolution: int, importance_cells: int
-    ):
-        self._context = context
-        defines = {
-            **buffer_bindings.DEFINES,
-            "RSM_RESOLUTION": rsm_resolution,
-            "IMPORTANCE_CELLS": importance_cells,
-        }
-        self._mean_footprint = load_compute(context, "virtual_point_lights/vpl_mean_footprint", defines)
-        self._emitters = load_compute(context, "screen_space_indirect/screen_space_emitters", defines)
-        self._program = load_compute(
-            context,
+    The dynamic lights' irradiance has no VPLs and is left out.
+    """
+
+    name = "screen_space_indirect"
+
+    def __init__(self, resources: Resources, rsm: ReflectiveShadowMap, importance_cells: int):
+        self._rsm = rsm
+        target = resources.texture("vpl_irradiance")
+        resources["vpl_footprint"] = resources.context.buffer(reserve=16)
+        resources["emitters"] = create_irradiance_target(resources.context, target.size)
+        self._groups = pixel_groups(target)
+        self._footprint = ComputeProgram(
+            resources,
+            "virtual_point_lights/vpl_mean_footprint",
+            reads=("virtual_point_lights",),
+            writes=("vpl_footprint",),
+        )
+        parameters = ("artist_parameters", "frame_statistics")
+        self._emitters = ComputeProgram(
+            resources,
+            "screen_space_indirect/screen_space_emitters",
+            {"RSM_RESOLUTION": rsm.resolution, "IMPORTANCE_CELLS": importance_cells},
+            reads=(
+                *GBUFFER_READS,
+                *RSM_READS,
+                *parameters,
+                "vpl_importance",
+                "gbuffer_albedo",
+                "direct_irradiance",
+                "light_accumulation",
+            ),
+            writes=("emitters",),
+        )
+        self._program = ComputeProgram(
+            resources,
             "screen_space_indirect/screen_space_indirect",
             {
-                **defines,
                 "BLOCK": BLOCK,
                 "SAMPLES": SAMPLES,
                 "NEAREST_PIXEL": NEAREST_PIXEL,
                 "R2_STEP_X": R2_STEPS[0],
                 "R2_STEP_Y": R2_STEPS[1],
             },
+            reads=(*GBUFFER_READS, *parameters, "vpl_footprint", "emitters"),
+            writes=("shared_irradiance as irradiance",),
         )
-        self._footprint = context.buffer(reserve=16)
-        self._emitter_image = create_irradiance_target(context, size)
 
-    def draw(
-        self,
-        camera: CameraUniforms,
-        gbuffer: GBuffer,
-        direct_irradiance: moderngl.Texture,
-        accumulated: LightAccumulation | None,
-        light_count: int,
-        vpl_count: int,
-        interleaved_irradiance: moderngl.Texture,
-    ) -> None:
-        """Gather for the lights, faces, VPLs and parameters that are bound.
+    def wanted(self, inputs: FrameInputs) -> bool:
+        """Where a near field is asked for. Discs withhold nothing that it would have to give back."""
+        return inputs.parameters.screen_space_strength > 0.0 and not inputs.parameters.vpls_are_discs
 
-        `accumulated` light has no VPLs and is left out.
-        """
-        context = self._context
-        groups = (-(-interleaved_irradiance.width // 8), -(-interleaved_irradiance.height // 8))
-        self._footprint.bind_to_storage_buffer(buffer_bindings.VPL_FOOTPRINT)
-        set_uniforms(self._mean_footprint, vpl_count=vpl_count)
-        self._mean_footprint.run(1)
-
-        camera.bind_gbuffer(self._emitters, gbuffer, 0)
-        gbuffer.albedo.use(2)
-        direct_irradiance.use(3)
-        if accumulated is not None:
-            accumulated.texture.use(4)
-        set_uniforms(
-            self._emitters,
-            gbuffer_albedo=2,
-            direct_irradiance=3,
-            light_accumulation=4,
-            accumulation_unit=0.0 if accumulated is None else accumulated.unit,
-            vpl_count=vpl_count,
-            light_count=light_count,
-        )
-        self._emitter_image.bind_to_image(0, read=False, write=True)
-        self._emitters.run(*groups)
-        context.memory_barrier(context.TEXTURE_FETCH_BARRIER_BIT | context.SHADER_STORAGE_BARRIER_BIT)
-
-        camera.bind_gbuffer(self._program, gbuffer, 0)
-        self._emitter_image.use(2)
-        set_uniforms(self._program, emitters=2)
-        interleaved_irradiance.bind_to_image(0, read=False, write=True)
-        self._program.run(*groups)
-        context.memory_barrier(context.TEXTURE_FETCH_BARRIER_BIT)
+    def draw(self, inputs: FrameInputs) -> None:
+        """Sample the neighbourhood of every pixel."""
+        uniforms = {
+            **inputs.camera.uniforms,
+            **self._rsm.uniforms,
+            "vpl_count": inputs.parameters.vpl_count,
+            "light_count": inputs.light_count,
+            "accumulation_unit": inputs.accumulation_unit,
+        }
+        self._footprint.dispatch(1, **uniforms)
+        self._emitters.dispatch(*self._groups, **uniforms)
+        self._program.dispatch(*self._groups, **uniforms)

@@ -1,42 +1,42 @@
 """Tone mapping: exposure, measured on the GPU or given, then tone curve and sRGB."""
 
-import moderngl
 import numpy as np
 
-from vpltune.renderer.gpu import buffer_bindings
-from vpltune.renderer.gpu.shader_library import load_compute, set_uniforms
+from vpltune.renderer.gpu.gpu_program import ComputeProgram
+from vpltune.renderer.gpu.render_targets import pixel_groups
+from vpltune.renderer.gpu.resources import Resources
 
 EXPOSURE_KEY = 0.25
-"""What the mean luminance of the image is brought to before the tone curve."""
+"""Mean luminance of the image before the tone curve. A choice: a room's walls then look neither grey nor
+burnt out."""
+_EXPOSURE_BYTES = 16
+"""Bytes of a float, rounded up as storage blocks are."""
 
 
 class ToneMappingPass:
     """Radiance → 8-bit display image."""
 
-    def __init__(self, context: moderngl.Context):
-        self._context = context
-        defines = {**buffer_bindings.DEFINES, "EXPOSURE_KEY": EXPOSURE_KEY}
-        self._measure = load_compute(context, "display/exposure", defines)
-        self._program = load_compute(context, "display/tone_mapping", defines)
-        self._exposure = context.buffer(reserve=16)
+    name = "tone_mapping"
 
-    def draw(self, radiance: moderngl.Texture, exposure: float | None, display: moderngl.Texture) -> None:
+    def __init__(self, resources: Resources):
+        self._resources = resources
+        resources["exposure"] = resources.context.buffer(reserve=_EXPOSURE_BYTES)
+        self._groups = pixel_groups(resources.texture("display"))
+        self._measure = ComputeProgram(
+            resources,
+            "display/exposure",
+            {"EXPOSURE_KEY": EXPOSURE_KEY},
+            reads=("radiance",),
+            writes=("exposure",),
+        )
+        self._program = ComputeProgram(
+            resources, "display/tone_mapping", reads=("radiance", "exposure"), writes=("display",)
+        )
+
+    def draw(self, exposure: float | None) -> None:
         """`exposure` multiplies radiance before the curve; None measures it from the image."""
-        context = self._context
-        self._exposure.bind_to_storage_buffer(buffer_bindings.EXPOSURE)
-        radiance.use(0)
         if exposure is None:
-            set_uniforms(self._measure, radiance=0)
-            self._measure.run(1)
-            # The exposure may be read back, or given by the program next time.
-            context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT | context.BUFFER_UPDATE_BARRIER_BIT)
+            self._measure.dispatch(1)
         else:
-            self._exposure.write(np.float32(exposure).tobytes())
-        set_uniforms(self._program, radiance=0)
-        display.bind_to_image(0, read=False, write=True)
-        self._program.run(-(-display.width // 8), -(-display.height // 8))
-        context.memory_barrier(context.TEXTURE_FETCH_BARRIER_BIT)
-
-    def read_exposure(self) -> float:
-        """What radiance was multiplied by last: waits for the GPU."""
-        return float(np.frombuffer(self._exposure.read(4), np.float32)[0])
+            self._resources.write("exposure", np.float32(exposure).tobytes())
+        self._program.dispatch(*self._groups)

@@ -1,108 +1,126 @@
 """Virtual point lights drawn from the RSM on the GPU: density over texels, then a warped point table."""
 
-import moderngl
-
+from vpltune.renderer.frame.disc_samples import sample_count
+from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
 from vpltune.renderer.frame.point_table import PointTable, point_table, r2_sequence
-from vpltune.renderer.gpu import buffer_bindings
-from vpltune.renderer.gpu.render_targets import ReflectiveShadowMap
-from vpltune.renderer.gpu.shader_library import load_compute, set_uniforms
+from vpltune.renderer.gpu.gpu_program import ComputeProgram
+from vpltune.renderer.gpu.render_targets import RSM_READS, ReflectiveShadowMap
+from vpltune.renderer.gpu.resources import Resources
 
 ROW_GROUP_SIZE = 64
+"""Invocations that sum one row of the atlas. A choice."""
 VPL_BYTES = 48
+"""Bytes of a VPL: `shaders/common/virtual_point_lights.glsl`."""
 FRAME_STATISTICS_BYTES = 16
+"""Bytes of `shaders/common/scene_length.glsl`."""
 _ROW_MOMENTS_BYTES = 32
+"""Bytes of a row in shaders/virtual_point_lights/vpl_row_density.comp."""
+_DENSITY_READS = (*RSM_READS, "artist_parameters", "vpl_importance")
+_PLACEMENT_READS = (*_DENSITY_READS, "row_cdf", "marginal_cdf", "frame_statistics")
 
 
-class VirtualPointLightsPass:
-    """RSM atlas → `count` VPLs and the frame's statistics (total flux, scene length L).
+class VplDensityPass(FramePass):
+    """RSM atlas → the chance of each texel, ∝ flux^γ · importance, as running sums; total flux and L."""
+
+    name = "virtual_point_lights"
+
+    def __init__(self, resources: Resources, rsm: ReflectiveShadowMap, importance_cells: int):
+        self._rsm = rsm
+        context, rows = resources.context, rsm.rows
+        resources["row_cdf"] = context.buffer(reserve=rows * rsm.depth.width * 4)
+        resources["row_moments"] = context.buffer(reserve=rows * _ROW_MOMENTS_BYTES)
+        resources["marginal_cdf"] = context.buffer(reserve=rows * 4)
+        resources["frame_statistics"] = context.buffer(reserve=FRAME_STATISTICS_BYTES)
+        defines = {
+            "RSM_RESOLUTION": rsm.resolution,
+            "ROW_GROUP_SIZE": ROW_GROUP_SIZE,
+            "IMPORTANCE_CELLS": importance_cells,
+        }
+        self._rows = ComputeProgram(
+            resources,
+            "virtual_point_lights/vpl_row_density",
+            defines,
+            reads=_DENSITY_READS,
+            writes=("row_cdf", "row_moments"),
+        )
+        self._marginal = ComputeProgram(
+            resources,
+            "virtual_point_lights/vpl_marginal_density",
+            defines,
+            reads=("row_moments",),
+            writes=("marginal_cdf", "frame_statistics"),
+        )
+
+    def draw(self, inputs: FrameInputs) -> None:
+        """Sum each row, then the rows."""
+        uniforms = {**self._rsm.uniforms, "moment_origin": inputs.records.moment_origin}
+        self._rows.dispatch(self._rsm.rows, **uniforms)
+        self._marginal.dispatch(1, rows=self._rsm.rows)
+
+
+class VirtualPointLightsPass(FramePass):
+    """RSM atlas, its density → `count` VPLs, or for clustered discs the samples that they are made of.
 
     Each has flux and area of the `rsm_filtering`² texels around its own, in the mean; an odd number.
     """
 
+    name = "virtual_point_lights"
+
     def __init__(
         self,
-        context: moderngl.Context,
+        resources: Resources,
         rsm: ReflectiveShadowMap,
         count: int,
-        table: PointTable = "r2",
-        rsm_filtering: int = 1,
-        importance_cells: int = 1,
+        table: PointTable,
+        rsm_filtering: int,
+        importance_cells: int,
     ):
-        self._context = context
-        self.count = count
-        defines = {
-            **buffer_bindings.DEFINES,
+        self._resources = resources
+        self._rsm = rsm
+        self._count = count
+        self._defines = {
             "RSM_RESOLUTION": rsm.resolution,
             "RSM_FILTERING": rsm_filtering,
-            "ROW_GROUP_SIZE": ROW_GROUP_SIZE,
             "IMPORTANCE_CELLS": importance_cells,
         }
-        self._row_density = load_compute(context, "virtual_point_lights/vpl_row_density", defines)
-        self._marginal_density = load_compute(context, "virtual_point_lights/vpl_marginal_density", defines)
-        self._placement = load_compute(context, "virtual_point_lights/virtual_point_lights", defines)
-        columns, rows = rsm.depth.width, rsm.rows
-        self._buffers = {
-            buffer_bindings.POINT_TABLE: context.buffer(point_table(table, count).tobytes()),
-            buffer_bindings.ROW_CDF: context.buffer(reserve=rows * columns * 4),
-            buffer_bindings.ROW_MOMENTS: context.buffer(reserve=rows * _ROW_MOMENTS_BYTES),
-            buffer_bindings.MARGINAL_CDF: context.buffer(reserve=rows * 4),
-        }
-        self.frame_statistics = context.buffer(reserve=FRAME_STATISTICS_BYTES)
-        self.virtual_point_lights = context.buffer(reserve=count * VPL_BYTES)
-        self.samples: moderngl.Buffer | None = None
-        self._sample_table: moderngl.Buffer | None = None
+        context = resources.context
+        resources["point_table"] = context.buffer(point_table(table, count).tobytes())
+        resources["virtual_point_lights"] = context.buffer(reserve=count * VPL_BYTES)
+        self._vpls = self._program("point_table", "virtual_point_lights")
+        self._samples: ComputeProgram | None = None
 
-    def distribute(self, rsm: ReflectiveShadowMap, moment_origin: tuple[float, float, float]) -> None:
-        """How VPLs are spread over the RSM, by the densities γ and η and the importance that are bound.
+    def draw(self, inputs: FrameInputs) -> None:
+        """Place the VPLs, or the samples that the discs are made of."""
+        if not inputs.parameters.vpls_are_discs:
+            self._dispatch(self._vpls, self._count, inputs)
+            return
+        if self._samples is None:
+            samples, context = sample_count(self._count), self._resources.context
+            self._resources["vpl_samples"] = context.buffer(reserve=samples * VPL_BYTES)
+            self._resources["sample_table"] = context.buffer(r2_sequence(samples).tobytes())
+            self._samples = self._program("sample_table", "vpl_samples")
+        self._dispatch(self._samples, sample_count(self._count), inputs)
 
-        A texel's chance is ∝ flux^γ · F.
-        """
-        self._bind_density()
-        context = self._context
-        rsm.bind(self._row_density, 0)
-        set_uniforms(self._row_density, moment_origin=moment_origin)
-        self._row_density.run(rsm.rows)
-        context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT)
-        set_uniforms(self._marginal_density, rows=rsm.rows)
-        self._marginal_density.run(1)
-        context.memory_barrier(context.SHADER_STORAGE_BARRIER_BIT)
+    def _program(self, table: str, target: str) -> ComputeProgram:
+        return ComputeProgram(
+            self._resources,
+            "virtual_point_lights/virtual_point_lights",
+            self._defines,
+            reads=(
+                *_DENSITY_READS,
+                "row_cdf",
+                "marginal_cdf",
+                "frame_statistics",
+                f"{table} as point_table",
+            ),
+            writes=(f"{target} as virtual_point_lights",),
+        )
 
-    def draw(
-        self, rsm: ReflectiveShadowMap, table_rotation: tuple[float, float], sample_count: int = 0
-    ) -> None:
-        """Place the VPLs, as they were last distributed over `rsm`.
-
-        `table_rotation` shifts the point table on its torus, in [0, 1)². Where `sample_count` is not 0, so
-        many are placed in `samples` instead, from the R2 sequence, which share all light among them.
-        """
-        self._bind_density()
-        rsm.bind(self._placement, 0)
-        set_uniforms(self._placement, rows=rsm.rows, table_rotation=table_rotation)
-        if sample_count > 0:
-            self._place_samples(sample_count)
-        else:
-            self._place(self.count)
-
-    def bind(self) -> None:
-        """Bind what the gather reads."""
-        self.frame_statistics.bind_to_storage_buffer(buffer_bindings.FRAME_STATISTICS)
-        self.virtual_point_lights.bind_to_storage_buffer(buffer_bindings.VIRTUAL_POINT_LIGHTS)
-
-    def _bind_density(self) -> None:
-        for binding, buffer in self._buffers.items():
-            buffer.bind_to_storage_buffer(binding)
-        self.bind()
-
-    def _place(self, count: int) -> None:
-        set_uniforms(self._placement, vpl_count=count)
-        self._placement.run(-(-count // 64))
-        self._context.memory_barrier(self._context.SHADER_STORAGE_BARRIER_BIT)
-
-    def _place_samples(self, count: int) -> None:
-        if self.samples is None or self._sample_table is None:
-            self.samples = self._context.buffer(reserve=count * VPL_BYTES)
-            self._sample_table = self._context.buffer(r2_sequence(count).tobytes())
-        self._sample_table.bind_to_storage_buffer(buffer_bindings.POINT_TABLE)
-        self.samples.bind_to_storage_buffer(buffer_bindings.VIRTUAL_POINT_LIGHTS)
-        self._place(count)
-        self.bind()
+    def _dispatch(self, program: ComputeProgram, count: int, inputs: FrameInputs) -> None:
+        program.dispatch(
+            -(-count // 64),
+            **self._rsm.uniforms,
+            rows=self._rsm.rows,
+            table_rotation=inputs.table_rotation,
+            vpl_count=count,
+        )

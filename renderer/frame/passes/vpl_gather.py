@@ -1,95 +1,96 @@
-"""VPL gather: indirect irradiance at every pixel in a compute shader, from every VPL or from its share."""
+"""VPL gather: indirect irradiance at every pixel, from every VPL or from the pixel's share of them."""
 
-import moderngl
+from collections.abc import Sequence
 
 from vpltune.renderer.frame import vpl_disc_bounds
-from vpltune.renderer.frame.visibility_map_layout import NO_MAPS, VisibilityMapLayout
-from vpltune.renderer.gpu import buffer_bindings
-from vpltune.renderer.gpu.camera_uniforms import CameraUniforms
-from vpltune.renderer.gpu.render_targets import GBuffer, PixelList
-from vpltune.renderer.gpu.shader_library import load_compute, set_uniforms
+from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
+from vpltune.renderer.frame.visibility_map_layout import MAP_READS, VisibilityMapLayout
+from vpltune.renderer.gpu.gpu_program import ComputeProgram
+from vpltune.renderer.gpu.render_targets import GBUFFER_READS
+from vpltune.renderer.gpu.resources import Resources
+
+GATHER_READS = (
+    *GBUFFER_READS, "artist_parameters", "frame_statistics", "virtual_point_lights", "pixel_list"
+)  # fmt: skip
+_GROUP_SIDE = 8
+"""Pixels along the side of a workgroup."""
 
 
-class VplGatherPass:
-    """G-buffer, VPLs → indirect irradiance.
+class VplGatherPass(FramePass):
+    """G-buffer, VPLs, visibility maps → `vpl_irradiance`.
 
-    `interleave` n: each pixel of an n×n block gathers from its own n²-th part of the VPLs, n² times as
-    bright (Keller and Heidrich 2001). Such an image is for the interleaved filter; 1 is the full gather.
-    `visibility`: the layout of the VPLs' visibility maps, which may be none.
+    With `interleave` n > 1, each pixel of an n×n block gathers from its own n²-th part of the VPLs, n² times
+    as bright (Keller and Heidrich 2001), into `shared_irradiance` and `shared_direction`, for the filter.
     """
 
-    def __init__(
-        self, context: moderngl.Context, interleave: int = 1, visibility: VisibilityMapLayout = NO_MAPS
-    ):
-        self._context = context
-        self._visibility = visibility
+    name = "vpl_gather"
+
+    def __init__(self, resources: Resources, interleave: int, maps: VisibilityMapLayout):
+        self._resources = resources
         self._interleave = interleave
-        self._programs: dict[tuple[bool, bool], moderngl.ComputeShader] = {}
+        writes = ("vpl_irradiance as irradiance",)
+        if interleave > 1:
+            writes = ("shared_irradiance as irradiance", "shared_direction as direction")
+        self._program = _GatherProgram(resources, maps, interleave, writes, listed_pixels=False)
 
-    def draw(
+    def draw(self, inputs: FrameInputs) -> None:
+        """Gather at every pixel."""
+        target = self._resources.texture("vpl_irradiance")
+        side = _GROUP_SIDE * self._interleave
+        groups = (-(-target.width // side), -(-target.height // side), self._interleave**2)
+        self._program.of(inputs).dispatch(*groups, **_uniforms(inputs))
+
+
+class GatherListedPixelsPass(FramePass):
+    """The full gather at the pixels that the interleaved filter has listed; others stay as they are."""
+
+    name = "vpl_gather"
+
+    def __init__(self, resources: Resources, maps: VisibilityMapLayout):
+        writes = ("vpl_irradiance as irradiance",)
+        self._program = _GatherProgram(resources, maps, 1, writes, listed_pixels=True)
+
+    def draw(self, inputs: FrameInputs) -> None:
+        """Gather at the listed pixels."""
+        self._program.of(inputs).dispatch_indirect("pixel_list", **_uniforms(inputs))
+
+
+class _GatherProgram:
+    """The gather's program for points or discs, compiled when it is first needed."""
+
+    def __init__(
         self,
-        camera: CameraUniforms,
-        gbuffer: GBuffer,
-        vpl_count: int,
-        irradiance: moderngl.Texture,
-        direction: moderngl.Texture | None = None,
-        cells: bool = False,
-    ) -> None:
-        """Gather from the VPLs, with the parameters, that are bound.
+        resources: Resources,
+        maps: VisibilityMapLayout,
+        interleave: int,
+        writes: Sequence[str],
+        *,
+        listed_pixels: bool,
+    ):
+        self._resources = resources
+        self._maps = maps
+        self._writes = writes
+        self._defines = {
+            **vpl_disc_bounds.DEFINES,
+            **maps.defines,
+            "INTERLEAVE": interleave,
+            "LISTED_PIXELS": listed_pixels,
+        }
+        self._programs: dict[bool, ComputeProgram] = {}
 
-        `direction` takes where the light comes from, in an interleaved image. `cells`: VPLs are cells of
-        light, which shine as discs, and not points.
-        """
-        program = self._program(cells, listed_pixels=False)
-        self._bind(program, camera, gbuffer, vpl_count, irradiance)
-        if direction is not None:
-            direction.bind_to_image(1, read=False, write=True)
-        side = 8 * self._interleave
-        groups = (-(-irradiance.width // side), -(-irradiance.height // side))
-        program.run(*groups, self._interleave**2)
-        self._context.memory_barrier(self._context.TEXTURE_FETCH_BARRIER_BIT)
-
-    def refine(
-        self,
-        camera: CameraUniforms,
-        gbuffer: GBuffer,
-        vpl_count: int,
-        pixel_list: PixelList,
-        irradiance: moderngl.Texture,
-        cells: bool = False,
-    ) -> None:
-        """Gather in full at the listed pixels of an interleaved image, and leave the others as they are."""
-        assert self._interleave > 1, "a full gather has nothing to refine"
-        program = self._program(cells, listed_pixels=True)
-        self._bind(program, camera, gbuffer, vpl_count, irradiance)
-        pixel_list.bind()
-        program.run_indirect(pixel_list.buffer)
-        self._context.memory_barrier(self._context.TEXTURE_FETCH_BARRIER_BIT)
-
-    def _program(self, cells: bool, listed_pixels: bool) -> moderngl.ComputeShader:
-        """Compiled when it is first needed: most configs need one form of VPL."""
-        if (cells, listed_pixels) not in self._programs:
-            defines = {
-                **buffer_bindings.DEFINES,
-                **vpl_disc_bounds.DEFINES,
-                "INTERLEAVE": 1 if listed_pixels else self._interleave,
-                "LISTED_PIXELS": listed_pixels,
-                "VPL_DISCS": cells,
-                **self._visibility.defines,
-            }
-            self._programs[cells, listed_pixels] = load_compute(
-                self._context, "vpl_gather/vpl_gather", defines
+    def of(self, inputs: FrameInputs) -> ComputeProgram:
+        """The program for the VPLs of this drawing."""
+        discs = inputs.parameters.vpls_are_discs
+        if discs not in self._programs:
+            self._programs[discs] = ComputeProgram(
+                self._resources,
+                "vpl_gather/vpl_gather",
+                {**self._defines, "VPL_DISCS": discs},
+                reads=(*GATHER_READS, *(MAP_READS if self._maps.size else ())),
+                writes=self._writes,
             )
-        return self._programs[cells, listed_pixels]
+        return self._programs[discs]
 
-    def _bind(
-        self,
-        program: moderngl.ComputeShader,
-        camera: CameraUniforms,
-        gbuffer: GBuffer,
-        vpl_count: int,
-        irradiance: moderngl.Texture,
-    ) -> None:
-        camera.bind_gbuffer(program, gbuffer, 0)
-        set_uniforms(program, vpl_count=vpl_count)
-        irradiance.bind_to_image(0, read=False, write=True)
+
+def _uniforms(inputs: FrameInputs) -> dict[str, object]:
+    return {**inputs.camera.uniforms, "vpl_count": inputs.parameters.vpl_count}

@@ -1,4 +1,4 @@
-"""A whole library: resumed by default, each content once, and its log read by pandas."""
+"""A batch resumes by default, fits duplicate scenes once, and writes a log that pandas reads."""
 
 import json
 import shutil
@@ -126,7 +126,7 @@ def test_what_killed_processes_left_is_swept_and_records_are_not(library, fits):
 def test_pandas_reads_the_log(library, fits):
     run(library)
     with (library.parent / "out" / "log.jsonl").open("a") as file:
-        file.write('{"event": "record", "na')  # what a kill in the middle of a line would leave
+        file.write('{"event": "record", "na')  # as if a run had been killed in the middle of a line
     (library / "small.glb").write_bytes(b"!")
     run(library)
     log = pandas.read_json(library.parent / "out" / "log.jsonl", lines=True)

@@ -1,0 +1,22 @@
+"""What a clip carries from one frame to the next."""
+
+import moderngl
+
+
+class ClipState:
+    """The eased parameters of an `auto` config, on the GPU. Make one for each clip, and none for a still.
+
+    Example:
+        >>> state = ClipState()
+        >>> for view in views:
+        ...     image = runtime.render(view, config, state)
+    """
+
+    def __init__(self) -> None:
+        self._buffers: dict[str, moderngl.Buffer] = {}
+
+    def buffer(self, context: moderngl.Context, name: str, size: int) -> moderngl.Buffer:
+        """The buffer called `name` of `size` bytes, zero before its first use."""
+        if name not in self._buffers:
+            self._buffers[name] = context.buffer(bytes(size))
+        return self._buffers[name]

@@ -1,0 +1,13 @@
+"""How many RSM samples clustered disc lights are made of, and how near they count."""
+
+SAMPLES = 4096
+"""Samples at least. A choice: every one is as strong as one of 4,096 points, far below a disc's own noise."""
+SAMPLES_OF_DISC = 4
+"""Samples for each disc, at least. A choice."""
+NORMAL_REACH = 0.7
+"""Distance, in L, that counts as much as normals that differ by 1. The best of 0.3, 0.7 and 1.5."""
+
+
+def sample_count(vpl_count: int) -> int:
+    """RSM samples that `vpl_count` clustered discs are made of."""
+    return max(SAMPLES, SAMPLES_OF_DISC * vpl_count)

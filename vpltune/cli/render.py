@@ -38,7 +38,9 @@ if TYPE_CHECKING:
     from vpltune.renderer.scene.views import View
 
 LARGEST_DYNAMIC_LIGHT_COUNT = 1_000_000
+"""The largest number that `--dynamic-lights` takes."""
 DYNAMIC_LIGHT_SEED = 0
+"""The seed of their places and directions: one command draws one image."""
 
 
 @takes_view_flags

@@ -1,4 +1,4 @@
-"""Progress of long work, on stderr: a bar on a terminal, lines with percent and time left anywhere else."""
+"""Progress of long work on stderr: a bar on a terminal, lines with percent and time left anywhere else."""
 
 import contextlib
 import sys
@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 Progress = Callable[[str, float], None]
-"""Called with the stage ("reference", "fit", …) and the share of it that is done, in [0, 1]."""
+"""Called with the name of a stage ("reference", "fit", …) and the share of it that is done, in [0, 1]."""
 
 
 @contextlib.contextmanager
@@ -41,7 +41,7 @@ def _bars() -> Iterator[Progress]:
         TextColumn("left"),
         TimeRemainingColumn(),
     )
-    # Nothing else is redirected: with --json, stdout is not ours to draw on.
+    # stdout is not redirected, because --json writes to it.
     with Bars(*columns, console=Console(stderr=True), redirect_stdout=False, redirect_stderr=False) as bars:
 
         def show(stage: str, fraction: float) -> None:
@@ -59,18 +59,17 @@ def _bars() -> Iterator[Progress]:
 
 
 def _finish(bars: Any, task: int) -> None:
-    """The stage is over: its bar is full, and its clock stands."""
+    """End a stage: fill its bar and stop its clock."""
     bars.update(task, completed=1.0)
     bars.stop_task(task)
 
 
 LINE_SECONDS = 10.0
-"""Between two lines of one stage, where there is no terminal."""
+"""Least time between two lines of a stage without a terminal. A choice."""
 
 
 def _line_per_stage() -> Progress:
-    """A line when a stage begins, and while it goes on one every `LINE_SECONDS` with what is done and
-    left."""
+    """Print a line when a stage begins, then one every `LINE_SECONDS` with percent and time left."""
     begun: dict[str, float] = {}
     last_line = 0.0
 

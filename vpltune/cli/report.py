@@ -1,4 +1,4 @@
-"""What a command hands back, and how it reaches the user: one JSON object, or text and tables."""
+"""The result of a command, and how it is printed: as one JSON object, or as text and tables."""
 
 import contextlib
 import os
@@ -9,6 +9,7 @@ from typing import Any
 
 from vpltune.renderer.files.strict_json import strict_json
 
+# Exit codes of `vpltune`. 2 is typer's for wrong arguments, and 130 = 128 + SIGINT the shells' for Ctrl-C.
 OK = 0
 BAD_INPUT = 2
 MACHINE_LACKS = 3
@@ -18,18 +19,18 @@ INTERRUPTED = 130
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """The outcome of a command."""
+    """The result of a command."""
 
     document: Mapping[str, Any]
-    """What `--json` prints."""
+    """Printed with `--json`."""
     shown: tuple[Any, ...]
-    """What is printed without it: strings (rich markup) and rich tables."""
+    """Printed without `--json`: strings with rich markup, and rich tables."""
     exit_code: int = OK
 
 
 @contextlib.contextmanager
 def stdout_sent_to_stderr() -> Iterator[None]:
-    """Everything that would reach stdout goes to stderr, a library's own printing from C included."""
+    """Send everything that is written to stdout to stderr, output of C libraries included."""
     sys.stdout.flush()
     kept = os.dup(1)
     os.dup2(2, 1)
@@ -62,5 +63,5 @@ def warn(lines: tuple[str, ...]) -> None:
 
 
 def one_line(text: object) -> str:
-    """`text` with every run of white space made one space."""
+    """`text` with each run of white space replaced by one space."""
     return " ".join(str(text).split())

@@ -62,7 +62,7 @@ def batch(
         typer.Option(
             min=1,
             max=1024,
-            help="Scenes to fit in parallel. [as many as cores and memory allow]",
+            help="Scenes to fit in parallel; by default as many as cores and memory allow.",
             show_default=False,
             rich_help_panel=RUN_PANEL,
         ),
@@ -85,7 +85,7 @@ def batch(
         str | None,
         typer.Option(
             metavar="N[M|G]",
-            help="Memory limit of a scene, in MiB or GiB. [the machine's memory ÷ workers]",
+            help="Memory limit of a scene, in MiB or GiB; by default the machine's memory ÷ workers.",
             show_default=False,
             rich_help_panel=RUN_PANEL,
         ),

@@ -85,7 +85,7 @@ class ParameterSpec:
         return self.low + place * (self.high - self.low)
 
     def within(self, place: float) -> float:
-        """`value_at`, clamped to the range: rounding may step over a bound by an ulp, and readers are strict."""
+        """`value_at`, clamped to the range: rounding may step over a bound, and readers are strict."""
         return float(min(max(self.value_at(place), self.low), self.high))
 
     def place_of(self, value: float) -> float:

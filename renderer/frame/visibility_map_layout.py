@@ -12,8 +12,8 @@ VISIBILITY_LEAST_LIFT = 1e-3
 """And by this share of L at least. Interpolated RSM depth is off by about 1e-4 L, and a VPL behind its own
 surface would see nothing else."""
 FRAME_TURNS_OVER = -0.5
-"""The z of a normal below which a map's tangents turn over. Not 0, where walls have their normals and rounding
-would decide."""
+"""The z of a normal below which a map's tangents turn over. Not 0, where walls have their normals and
+rounding would decide."""
 _LARGEST_SHARE = 0.4
 """Share of the texels that may be refined. 3 to 12 % of a room's texels are at a silhouette, 28 % in the
 busiest of sixteen scenes. Beyond that, texels stay coarse, and which ones may differ from frame to frame."""

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from vpltune.cli.report import one_line
+from vpltune.cli.verbosity import is_quiet, one_line, say
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars
@@ -19,10 +19,13 @@ STAGES = ("load", "reference", "capture", "fit", "evaluate")
 
 
 @contextlib.contextmanager
-def shown_batch(workers: int) -> Iterator["LineDisplay | BarDisplay"]:
+def shown_batch(workers: int) -> Iterator["SilentDisplay | LineDisplay | BarDisplay"]:
     """Display a batch that fits `workers` scenes in parallel, until the block ends."""
     from vpltune.tuner.batch.time_to_finish import Forecast
 
+    if is_quiet():
+        yield SilentDisplay()
+        return
     forecast = Forecast(workers)
     if not sys.stderr.isatty():
         yield LineDisplay(forecast)
@@ -42,6 +45,16 @@ def shown_batch(workers: int) -> Iterator["LineDisplay | BarDisplay"]:
         yield BarDisplay(forecast, bars)
 
 
+class SilentDisplay:
+    """Prints nothing, for `--quiet`."""
+
+    def found(self, jobs: "Sequence[Job]", already_done: int) -> None:
+        """Ignore the scenes to fit."""
+
+    def happened(self, event: dict[str, Any]) -> None:
+        """Ignore a scheduler's event."""
+
+
 class LineDisplay:
     """Plain lines: the number of scenes, and each scene when it ends."""
 
@@ -52,7 +65,7 @@ class LineDisplay:
         """Print the number of scenes to fit, and of those that have a record from an earlier run."""
         self._forecast.found(jobs)
         known = f", {already_done} have a record" if already_done else ""
-        _say(f"{len(jobs)} scene{'s' * (len(jobs) != 1)} to tune{known}")
+        say(f"{len(jobs)} scene{'s' * (len(jobs) != 1)} to tune{known}")
 
     def happened(self, event: dict[str, Any]) -> None:
         """Print a line if the scheduler's event ends an attempt or a scene."""
@@ -60,9 +73,9 @@ class LineDisplay:
         line = ending(event)
         if line and event["event"] == "record":
             done, left = self._forecast.done, time_left(self._forecast)
-            _say(f"[{done}/{self._forecast.total}] {line}{left}")
+            say(f"[{done}/{self._forecast.total}] {line}{left}")
         elif line:
-            _say(line)
+            say(line)
 
 
 class BarDisplay:
@@ -120,7 +133,3 @@ def time_left(forecast: "Forecast") -> str:
     unit, seconds = next(((u, s) for u, s in (("h", 3600), ("min", 60)) if high >= 2 * s), ("s", 1))
     first, last = round(low / seconds), max(1, round(high / seconds))
     return f"; {f'{first} to ' if first != last else ''}{last} {unit} left"
-
-
-def _say(text: str) -> None:
-    print(f"vpltune: {text}", file=sys.stderr, flush=True)

@@ -19,6 +19,7 @@ from vpltune.cli.options import (
     checked_scale,
 )
 from vpltune.cli.report import Report, warn
+from vpltune.cli.verbosity import detail
 from vpltune.cli.view_options import (
     ImageSizeOption,
     ViewFlags,
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 LARGEST_DYNAMIC_LIGHT_COUNT = 1_000_000
 """Most dynamic lights. A choice."""
 DYNAMIC_LIGHT_SEED = 0
-"""Seed of their positions and motion. A choice."""
+"""Seed of their positions and motion, fixed so that a command always draws the same image. A choice."""
 
 
 @takes_view_flags
@@ -120,6 +121,7 @@ def render(
     if factor != 1.0:
         loaded, drawn = scaled(loaded, factor), scaled_view(drawn, factor)
     runtime = Runtime(loaded)
+    detail(f"OpenGL on {runtime.opengl_renderer}")
     bouncing = _bouncing_lights(loaded, drawn, dynamic_lights)
     if frames is None:
         parameters = _write_layer(runtime, tuned, drawn, layer, output, bouncing)

@@ -7,10 +7,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from vpltune.cli.verbosity import say
 from vpltune.renderer.files.strict_json import strict_json
 
-# Exit codes of `vpltune`. 2 is typer's for wrong arguments, and 130 = 128 + SIGINT the shells' for Ctrl-C.
+# Exit codes of `vpltune`. DEFECT is for unexpected exceptions. 2 is typer's for wrong arguments, and
+# 130 = 128 + SIGINT the shells' for Ctrl-C.
 OK = 0
+DEFECT = 1
 BAD_INPUT = 2
 MACHINE_LACKS = 3
 PARTLY_DONE = 4
@@ -57,11 +60,6 @@ def print_json(document: Mapping[str, Any]) -> None:
 
 
 def warn(lines: tuple[str, ...]) -> None:
-    """Print each line on stderr as a warning."""
+    """Print each line on stderr as a note."""
     for line in lines:
-        print(f"vpltune: {one_line(line)}", file=sys.stderr)
-
-
-def one_line(text: object) -> str:
-    """`text` with each run of white space replaced by one space."""
-    return " ".join(str(text).split())
+        say(line)

@@ -128,7 +128,7 @@ def write_plot(path: Path, points: Sequence[BudgetFit]) -> None:
     axes.loglog(milliseconds, errors, "o-")
     for x, y, point in zip(milliseconds, errors, points, strict=True):
         axes.annotate(f" {point.frame.vpl_count} VPLs", (x, y), va="bottom")
-    axes.set(xlabel="frame [ms]", ylabel="relMSE on rotations not fitted to")
+    axes.set(xlabel="frame time [ms]", ylabel="relMSE on held-out rotations")
     axes.margins(x=0.15)
     axes.grid(which="both", alpha=0.3)
     with written_whole(path) as temporary:

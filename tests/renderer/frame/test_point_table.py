@@ -64,8 +64,8 @@ def deviation(gl_context, table: str, density_exponent: float) -> float:
     )
     parameters = ArtistParameters(vpl_count=256, density_exponent=density_exponent)
     config = TunedConfig(parameters, quality=Quality(rsm_resolution=256))
-    rotations = np.random.default_rng(0).random((64, 2))
-    frames = [runtime.capture(view, config, table_rotation=(float(u), float(v))) for u, v in rotations]
+    rotations = [(float(u), float(v)) for u, v in np.random.default_rng(0).random((64, 2))]
+    frames = runtime.captures(view, config, rotations)
     seen = frames[0].valid & (frames[0].normal_world[..., 1] > 0.9)
     irradiance = np.stack([frame.vpl_irradiance[seen] for frame in frames])
     return float(irradiance.std(axis=0).mean() / irradiance.mean())

@@ -1,16 +1,16 @@
-// The shaders of standalone_reader.py. SURFACES draws what a camera or a light sees; LIGHTING adds up, at every
-// pixel, the virtual point lights (VPLs) and the lights with their shadows.
+// The shaders of standalone_reader.py. SURFACES (VERTEX and FRAGMENT) draws the surfaces that a camera or a light sees.
+// LIGHTING adds up, at every pixel, the virtual point lights (VPLs) and the lights with their shadows.
 
 const float PI = 3.14159265358979;
 
 struct Light {
     vec4 position_kind;        // world position; 0 spot, 1 point, 2 directional
-    vec4 direction_scale;      // the way light travels; 1 / (cos inner - cos outer)
-    vec4 intensity_cos_outer;  // W/sr, for a directional light W/m²
+    vec4 direction_scale;      // unit direction of travel; 1 / (cos inner - cos outer)
+    vec4 intensity_cos_outer;  // W/sr (directional: W/m²); cosine of the outer half angle
 };
 layout(std430, binding = 0) readonly buffer Lights { Light lights[]; };
 
-// Irradiance square to the light, without shadow.
+// Irradiance [W/m²] on a surface that faces the light, without shadow; `towards` is the unit vector to the light.
 vec3 arriving(Light light, vec3 position, out vec3 towards) {
     towards = -light.direction_scale.xyz;
     if (light.position_kind.w == 2.0) { return light.intensity_cos_outer.rgb; }
@@ -40,14 +40,14 @@ void main() {
 #ifdef FRAGMENT
 in vec3 position, normal, base_color;
 in vec2 uv;
-layout(location = 0) out vec4 out_position;  // and depth along the view
-layout(location = 1) out vec4 out_normal;    // for a light: of the triangle's plane, and the texel's area
-layout(location = 2) out vec4 out_color;     // albedo; for a light: reflected flux
-uniform vec4 eye;    // w = 0: the direction towards it
+layout(location = 0) out vec4 out_position;  // world position; depth along the view axis
+layout(location = 1) out vec4 out_normal;    // shading normal; for a light: the triangle's normal, area on the surface
+layout(location = 2) out vec4 out_color;     // albedo; for a light: reflected flux [W]
+uniform vec4 eye;    // position of the viewer; w = 0: direction towards the viewer
 uniform vec4 axis;   // depth = dot(axis, position)
-uniform float reach;
-uniform int light;   // which light's map this is, or -1
-uniform float texel; // a texel's area at unit distance; for a directional light, its area
+uniform float reach; // the scene's diagonal: scales the depth buffer
+uniform int light;   // index of the light whose map this is, or -1 for the camera
+uniform float texel; // area of a texel at unit depth; for a directional light, its area
 uniform sampler2D image;
 uniform ivec2 mirrored;
 
@@ -69,9 +69,9 @@ void main() {
         vec3 towards;
         vec3 irradiance = arriving(lights[light], position, towards);
         float cosine = dot(plane, towards);
-        // Across the light's rays: a texel of a perspective map widens with depth, and is seen at a slant.
+        // Area across the light's rays: a texel of a perspective map grows with depth squared and is seen at an angle.
         float across = texel * (eye.w > 0.0 ? depth * depth * dot(axis.xyz, -towards) : 1.0);
-        // A smooth surface is lit by its shading normal but has the area of its true plane.
+        // A smooth-shaded surface is lit by its shading normal but has the area of its triangle; 8 bounds their ratio.
         float ratio = min(dot(shading, towards) / max(cosine, 1e-4), 8.0);
         out_normal = vec4(plane, across / max(cosine, 0.02));
         out_color = vec4(irradiance * across * albedo * ratio, 1.0);
@@ -84,8 +84,8 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 struct Face {
     mat4 to_face;
-    vec4 extent_light;  // half width and height at unit depth; which light; 1 where orthographic
-    vec4 origin;        // of its tile in the atlas
+    vec4 extent_light;  // half width and height at unit depth; index of the light; 1 if orthographic
+    vec4 origin;        // first texel of its tile in the atlas
 };
 layout(std430, binding = 1) readonly buffer Faces { Face faces[]; };
 layout(binding = 0) uniform sampler2D positions;
@@ -94,7 +94,7 @@ layout(binding = 2) uniform sampler2D albedos;
 layout(binding = 3) uniform sampler2D light_depths;
 layout(rgba32f, binding = 0) writeonly uniform image2D radiance;
 
-// Percentage-closer filtering of the four nearest texels, biased by texels.
+// Percentage-closer filtering of the four nearest texels. The bias, 1.5 and 0.5 texels, is the runtime's.
 float shadow(int light, vec3 position, vec3 normal, vec3 towards) {
     int chosen = 0;
     float most = -2.0;
@@ -129,7 +129,7 @@ void main() {
     for (int i = 0; i < vpls.length(); i += 3) {
         vec3 d = vpls[i].xyz - p, m = vpls[i + 1].xyz;
         float dd = max(dot(d, d), 1e-30), footprint = falloff_footprint * vpls[i].w;
-        float form = cells > 0
+        float form = disc_lights > 0
             ? disc_form(d / scene_length, n, m, footprint / scene_length) / (scene_length * scene_length)
             : max(dot(n, d), 0.0) * max(-dot(m, d), 0.0) / dd / (dd + footprint * footprint);
         form *= exp(-extinction_coefficient * sqrt(dd) / scene_length);

@@ -1,6 +1,7 @@
-"""Draws a scene that VPLtune exported, without VPLtune: python standalone_reader.py BUNDLE OUT.png
+"""Renders a scene that VPLtune exported, without VPLtune: python standalone_reader.py BUNDLE OUT.png
 
-BUNDLE: `vpltune export tuned.json --to bundle --scene scene.glb -o BUNDLE`. Shaders: standalone_*.glsl.
+BUNDLE: `vpltune export tuned.json --to bundle --scene scene.glb -o BUNDLE`. VPLs: standalone_vpls.py.
+Shaders: standalone_*.glsl. tests/renderer/export/test_standalone_reader.py compares with the runtime.
 """
 
 import json
@@ -12,7 +13,7 @@ import numpy as np
 from PIL import Image
 from standalone_vpls import virtual_point_lights
 
-PARTS = ("visibility", "disc", "reader")
+PARTS = ("visibility", "disc", "reader")  # standalone_<part>.glsl, one after another
 
 
 def shader(stage, numbers=()):
@@ -21,7 +22,7 @@ def shader(stage, numbers=()):
     return "\n".join(["#version 430", *defines, *(file.read_text(encoding="utf-8") for file in files)])
 
 
-class Surfaces:  # the triangles and textures of a bundle
+class Surfaces:  # the bundle's triangles and textures, and a pass that draws them
     def __init__(self, context, bundle, binary):
         self.context, self.bundle = context, bundle
         self.program = context.program(shader("VERTEX"), shader("FRAGMENT"))
@@ -41,7 +42,7 @@ class Surfaces:  # the triangles and textures of a bundle
             self.textures.append(texture)
 
     def seen(self, size, to_world, extent, light=-1, orthographic=False):
-        """Textures: position and depth, normal (and area), albedo (or flux)."""
+        """Draw from a camera or light. Textures: position and depth, normal (and area), albedo (or flux)."""
         targets = [self.context.texture(size, 4, dtype="f4") for _ in range(3)]
         self.context.framebuffer(targets, self.context.depth_texture(size)).use()
         self.context.clear()
@@ -63,7 +64,7 @@ def pixels(texture):  # [height, width, 4], bottom row first
     return np.frombuffer(texture.read(), "f4").reshape(texture.height, texture.width, 4)
 
 
-def light_maps(surfaces, rsm):  # an atlas of position, depth, plane's normal, area, flux, 1
+def light_maps(surfaces, rsm):  # the atlas: position, depth, triangle's normal, area, flux, 1
     atlas, size = np.zeros((*rsm["atlas"], 12)), rsm["resolution"]
     for face in rsm["faces"]:
         to_world, (row, column) = np.array(face["light_to_world"]), face["origin"]
@@ -73,7 +74,7 @@ def light_maps(surfaces, rsm):  # an atlas of position, depth, plane's normal, a
 
 
 def displayed(radiance, key):
-    """Exposed to a mean luminance of `key`, Khronos PBR Neutral tone curve, sRGB; top row first."""
+    """8-bit sRGB: mean luminance exposed to `key`, Khronos PBR Neutral tone curve; top row first."""
     luminance = (radiance[..., :3] @ [0.2126, 0.7152, 0.0722]).sum()
     exposure = key * radiance[..., 3].sum() / max(luminance, 1e-30)
     color = exposure * radiance[::-1, :, :3]
@@ -100,9 +101,9 @@ def main(folder, output):
     for binding, content in ((4, vpls), (5, bytes(16 * max(maps["map_room"], 1))), (6, bytes(4))):
         context.buffer(content).bind_to_storage_buffer(binding)
     numbers["extinction_coefficient"] *= bundle["config"]["visibility"] != "none"
-    cells = bundle["clustered_discs"]
-    numbers |= {"scene_length": length, "face_size": rsm["resolution"], "cells": cells["steps"]}
-    numbers |= cells["disc"] | maps
+    clustered = bundle["clustered_discs"]
+    numbers |= {"scene_length": length, "face_size": rsm["resolution"], "disc_lights": clustered["steps"]}
+    numbers |= clustered["disc"] | maps
     if maps["map_room"] > 0:
         texels = maps["map_size"] ** 2
         for stage, groups in (("CASTING", maps["map_size"]), ("MARKING", 1), ("REFINING", texels)):

@@ -1,37 +1,39 @@
-// The visibility maps of standalone_reader.py. CASTING sends rays from every VPL, one through each texel of a small
-// map of its hemisphere, against every triangle: short, not fast. Where what one texel met hides what its neighbour
-// met, MARKING puts a block of finer texels in its place, and REFINING casts those. LIGHTING asks the map what the VPL
-// sees on the way to a pixel. The program defines the config's parameters, scene_length, map_size (texels along the
-// side, or 0), map_refinement (texels along the side of a block) and map_blocks (for how many there is room).
+// The visibility maps of standalone_reader.py: a small map of the surfaces that each VPL's hemisphere sees.
+// CASTING sends one ray through each texel, against every triangle, which is short but slow. Where the surface in one
+// texel hides that in its neighbour, MARKING replaces the texel by a block of finer ones, and REFINING casts those.
+// LIGHTING looks up the map in the direction of a pixel. The program defines the config's parameters, scene_length,
+// map_size (texels along the side, or 0), map_refinement (texels along the side of a block) and map_blocks, the room
+// for blocks.
 
 #if defined(CASTING) || defined(MARKING) || defined(REFINING) || defined(LIGHTING)
 layout(std430, binding = 4) readonly buffer Vpls { vec4 vpls[]; };  // position, footprint; normal; flux
-// What a ray met: normal, distance; or -1 - the number of a block. Blocks lie after the maps of all VPLs.
+// The hit of each ray: normal, distance. A negative distance is -1 - the index of a block. Blocks follow all maps.
 layout(std430, binding = 5) coherent buffer Maps { vec4 maps[]; };
 const int map_texels = map_size * map_size, block_texels = map_refinement * map_refinement;
 
 int block_start(float number) { return vpls.length() / 3 * map_texels + int(number) * block_texels; }
 
-// Rays start clear of the VPL's own surface.
+// The origin of a VPL's rays, lifted off its own surface.
 vec3 map_origin(int vpl) {
     return vpls[vpl].xyz + vpls[vpl + 1].xyz * max(0.01 * vpls[vpl].w, 1e-3 * scene_length);
 }
 
-// Tangents, and the normal (Duff et al. 2017).
+// Columns: two tangents and the normal (Duff et al. 2017).
 mat3 map_frame(vec3 n) {
     float s = n.z >= -0.5 ? 1.0 : -1.0;
     float a = -1.0 / (s + n.z), b = n.x * n.y * a;
     return mat3(1.0 + s * n.x * n.x * a, s * b, -s * n.x, b, s + n.y * n.y * a, -n.y, n);
 }
 
-// Unit vectors of the hemisphere on the square [-1, 1]² (Cigolle et al. 2014, "hemi-oct").
+// The direction of a texel's ray: the hemisphere on the square [-1, 1]² (Cigolle et al. 2014, "hemi-oct").
 vec3 map_axis(ivec2 texel, int size) {
     vec2 place = (vec2(texel) + 0.5) * (2.0 / float(size)) - 1.0;
     vec2 p = vec2(place.x + place.y, place.x - place.y) * 0.5;
     return normalize(vec3(p, 1.0 - abs(p.x) - abs(p.y)));
 }
 
-// What was met stands before the other's plane, and that behind its own: by the lesser of the two, of the distance.
+// The lesser of two heights, as a share of the distance: of the hit in front of the other surface's plane, and of that
+// surface behind the plane of the hit.
 float overlap(vec3 end, vec3 plane, vec3 hidden, vec3 hidden_normal) {
     return min(dot(end - hidden, hidden_normal), dot(end - hidden, plane)) / length(hidden);
 }
@@ -46,11 +48,11 @@ vec3 corner(int i) {
     return vec3(positions[first], positions[first + 1u], positions[first + 2u]);
 }
 
-// What a VPL's ray through a texel meets. One ray in each invocation: Mesa's llvmpipe ends loops when an invocation has
-// gone through 65,535 rounds of them.
+// The hit of a VPL's ray through a texel. One ray for each invocation, because Mesa's llvmpipe ends a loop after 65,535
+// iterations in one invocation.
 vec4 met_along(int vpl, ivec2 texel, int size) {
     vec3 origin = map_origin(vpl), ray = map_frame(vpls[vpl + 1].xyz) * map_axis(texel, size);
-    // A ray that meets nothing ends far outside, at a wall that faces it: no pixel is behind it.
+    // A ray that hits nothing ends at a wall far outside that faces it: no pixel is behind it.
     vec4 met = vec4(-ray, 1e6 * scene_length);
     for (int i = 0; i < triangles.length(); i += 3) {  // Möller and Trumbore 1997
         vec3 a = corner(i), to_b = corner(i + 1) - a, to_c = corner(i + 2) - a;
@@ -122,7 +124,8 @@ void main() {
 #endif
 
 #ifdef LIGHTING
-// What the ray nearest to the pixel's direction met shades it if each is behind the other's plane.
+// Share of a VPL's light that reaches a pixel. The hit of the nearest ray shades it if each is behind the other's
+// plane.
 float visibility(int vpl, vec3 position, vec3 normal) {
     if (map_size == 0) { return 1.0; }
     mat3 frame = map_frame(vpls[vpl + 1].xyz);

@@ -1,7 +1,8 @@
-"""Virtual point lights for standalone_reader.py: rows of position, footprint, normal, 0, flux, 0.
+"""Draws the virtual point lights (VPLs) for standalone_reader.py, in numpy.
 
-The atlas: what the lights see, texel by texel: position, depth, plane's normal, area, flux, 1.
-Seen: what the camera sees: position, depth, normal, 0, albedo, 1.
+A VPL is a row: position, footprint, normal, 0, flux, 0. `atlas` holds what the lights see, texel by texel:
+position, depth, triangle's normal, area, flux, 1. `seen` holds what the camera sees: position, depth,
+normal, 0, albedo, 1.
 """
 
 import numpy as np
@@ -10,7 +11,7 @@ DARK = [*np.zeros(6), 1.0, *np.zeros(5)]
 
 
 def virtual_point_lights(atlas, seen, bundle):
-    """The VPLs, and the scene's length L: the spread of its light."""
+    """The VPLs, and the scene length L: the flux-weighted RMS distance of lit texels from their centroid."""
     flux, position = atlas[..., 8:11].mean(-1), atlas[..., :3]
     if not flux.any():
         return np.tile(DARK, (bundle["config"]["parameters"]["vpl_count"], 1)).astype("f4"), 1.0
@@ -32,10 +33,12 @@ def virtual_point_lights(atlas, seen, bundle):
 
 
 def importance(atlas, seen, bundle):
-    """For each texel, how much error its light would leave on the image if it were drawn too seldom.
+    """For each texel, how much error the image would have if its light were drawn too seldom.
 
-    Cells of 16 texels of the atlas light some points of the image, without visibility. The chances of least
-    relative error are sqrt(sum of squares of what a point gets from the cell, over what it gets from all).
+    Importance cells, each summarised from 16 texels, light some points of the image, without visibility. The
+    relative error is least if a texel's probability is ∝ flux · sqrt(Σ f² / (E² + bound)), summed over the
+    points: f is a point's irradiance per watt from the texel's cell, E that from all cells. Runtime:
+    shaders/vpl_importance/vpl_importance.comp.
     """
     rules, size = bundle["vpl_importance"], bundle["rsm"]["resolution"]
     cells, dot = rules["cells"], lambda a, b: (a * b).sum(-1)
@@ -60,7 +63,7 @@ def importance(atlas, seen, bundle):
         return np.ones(atlas.shape[:2])
     to_cell = position - points[:, None, :3]
     squared = np.maximum(dot(to_cell, to_cell), 1e-30)
-    # Less than a thousandth is a surface's own plane, where rounding says which side.
+    # Below 1e-3 a surface lies in the other's plane, and rounding decides on which side.
     cosines = [dot(points[:, None, 4:7], to_cell), dot(-normal, to_cell)] / np.sqrt(squared) - 1e-3
     form = np.prod(np.maximum(cosines, 0), axis=0) / (np.pi * squared + rules["spread"] * area)
     form *= straight > 1e-4
@@ -73,24 +76,24 @@ def importance(atlas, seen, bundle):
 
 
 def drawn(atlas, weight, bundle, count):
-    """So many VPLs, by chances of that weight."""
+    """`count` VPLs, drawn in proportion to `weight`. Runtime: shaders/common/vpl_placement.glsl."""
     rsm, flux = bundle["rsm"], atlas[..., 8:11].mean(-1)
     size, filtering = rsm["resolution"], rsm["filtering"]
     in_row, rows = np.cumsum(weight, axis=1), np.cumsum(weight.sum(1))
     x, y = ((0.5 + np.arange(1, count + 1)[:, None] * bundle["point_table"]["steps"]) % 1).T
     row = np.searchsorted(rows, y * rows[-1], "right")
     column = (in_row[row] <= (x * in_row[row, -1])[:, None]).sum(1)
-    # What the inversion leaves over is the place in the texel.
+    # The rest of the table's point after the inversion gives the position inside the texel.
     right = 1 + (x * in_row[row, -1] - in_row[row, column]) / weight[row, column]
     up = 1 + (y * rows[-1] - rows[row]) / in_row[row, -1]
-    # Each VPL has the mean light of the texels around its own.
+    # Each VPL has the mean flux and area of the texels around its own.
     at = np.stack([row, column], axis=1)
     window = at[:, None] + np.array([*np.ndindex(filtering, filtering)]) - filtering // 2
     around = tuple(np.moveaxis(window % weight.shape, -1, 0))
     lit = (window // size == at[:, None] // size).all(-1) & (flux[around] > 0)
     draws = count * (weight[around] * lit).sum(1)[:, None] / rows[-1]
     near = (atlas[around] * lit[..., None]).sum(1) / draws
-    # It slides with that place over the plane of its own texel.
+    # It slides with the position inside the texel, over the plane of the texel's surface.
     faces = [rsm["faces"][number] for number in row // size * (weight.shape[1] // size) + column // size]
     to_world, extent = (np.array([face[key] for face in faces]) for key in ("light_to_world", "extent"))
     flat = np.array([[face["orthographic"]] for face in faces])
@@ -106,24 +109,24 @@ def drawn(atlas, weight, bundle, count):
 
 
 def relaxed(vpls, samples, length, reach):
-    """The VPLs in the middles of their cells, with the light of the samples nearest to each (Lloyd 1982)."""
+    """One Lloyd iteration (1982): each VPL moves to the centroid of its nearest samples, with their flux."""
 
-    def element(position, normal):  # normals count too: no cell goes round a corner
+    def element(position, normal):  # normals count too: no cluster goes round an edge
         return np.concatenate([position / length, reach * normal], axis=-1)
 
     elements, owners = element(samples[:, :3], samples[:, 4:7]), element(vpls[:, :3], vpls[:, 4:7])
-    # Less the square of the element, which is the same for all VPLs; dark ones own nothing.
+    # Squared distances without the sample's own square, the same for all VPLs. Dark VPLs own no sample.
     away = np.where(vpls[:, 3] > 0, (owners**2).sum(1), np.inf) - 2 * elements @ owners.T
     owner, moved = away.argmin(1), np.tile(DARK, (len(vpls), 1))
     for number in np.unique(owner):
         own = samples[owner == number]
         middle, facing = own[:, :3].mean(0), own[:, 4:7].sum(0)
-        # A disc of the cell's spread, where a sample's own disc spreads by half its radius squared.
+        # The radius of a disc with the cluster's spread. A sample's own disc adds half its radius squared.
         radius = np.sqrt(2 * ((own[:, :3] - middle) ** 2).sum(1).mean() + (own[:, 3] ** 2).mean())
         there = element(middle, facing / max(np.linalg.norm(facing), 1e-30))
         near = own[((elements[owner == number] - there) ** 2).sum(1).argmin()]
-        # To the middle over the plane of the sample next to it, but within its disc: the middle of what
-        # surrounds a box lies in the box.
+        # Slide along the nearest sample's plane towards the centroid, but stay within that sample's disc: the
+        # centroid of samples all round a box lies inside the box.
         slide = middle - near[:3]
         slide -= near[4:7] * (near[4:7] @ slide)
         slide *= min(1, near[3] / max(np.linalg.norm(slide), 1e-30))

@@ -78,6 +78,22 @@ class ParameterSpec:
             raise InputError(f"{where}.{self.name}: must be a whole number, got {value!r:.60}")
         return int(value)
 
+    def value_at(self, place: Any) -> Any:
+        """The value at `place` in [0, 1] along the axis; for numbers, NumPy and JAX arrays alike."""
+        if self.scale == "log":
+            return self.low * (self.high / self.low) ** place
+        return self.low + place * (self.high - self.low)
+
+    def within(self, place: float) -> float:
+        """`value_at`, clamped to the range: rounding may step over a bound, and readers are strict."""
+        return float(min(max(self.value_at(place), self.low), self.high))
+
+    def place_of(self, value: float) -> float:
+        """Where along the axis, in [0, 1], the parameter has `value`."""
+        if self.scale == "log":
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
 
 ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
     ParameterSpec(

@@ -6,7 +6,6 @@ in the unit cube of the parameter table, each axis linear or logarithmic as the 
 shaders/auto_parameters/auto_parameters.comp, and `tuner.prior.prior_training` in JAX.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float64
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters, ParameterSpec, parameter_spec
+from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
 from vpltune.renderer.config.scene_statistics import STATISTIC_NAMES
 from vpltune.renderer.errors import InputError
 
@@ -52,7 +51,7 @@ class AutoPrior:
     ) -> ArtistParameters:
         """The parameters for a scene with these statistics; those that a prior does not set, from `rest`."""
         values = {
-            name: value_at(parameter_spec(name), float(place))
+            name: parameter_spec(name).within(float(place))
             for name, place in zip(AUTO_PARAMETERS, self.point(statistics), strict=True)
         }
         return ArtistParameters(**{**rest.as_dict(), **values})
@@ -98,23 +97,6 @@ class AutoPrior:
                     f"{where}: 0 ≤ lowest ≤ highest ≤ 1 must hold, got {low} and {high} of {name}"
                 )
         return cls(weights, bias, lowest, highest)
-
-
-def value_at(spec: ParameterSpec, place: float) -> float:
-    """The parameter's value at `place` in [0, 1] along its axis."""
-    if spec.scale == "log":
-        value = spec.low * (spec.high / spec.low) ** place
-    else:
-        value = spec.low + place * (spec.high - spec.low)
-    # Rounding may step over a bound by an ulp, and a config reader is strict.
-    return float(min(max(value, spec.low), spec.high))
-
-
-def place_of(spec: ParameterSpec, value: float | int) -> float:
-    """Where along its axis, in [0, 1], a parameter has `value`."""
-    if spec.scale == "log":
-        return math.log(value / spec.low) / math.log(spec.high / spec.low)
-    return (value - spec.low) / (spec.high - spec.low)
 
 
 def auto_schema() -> dict[str, Any]:

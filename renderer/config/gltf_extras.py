@@ -16,6 +16,7 @@ from vpltune.renderer.files.atomic_file import written_whole
 
 EXTRAS_KEY = "vpltune"
 _GLB_MAGIC = b"glTF"
+# "JSON", little-endian: glTF 2.0, 4.4.3.
 _JSON_CHUNK = 0x4E4F534A
 GLTF_SUFFIXES = (".gltf", ".glb")
 

@@ -18,6 +18,7 @@ BlockStorage = Literal["uniform", "buffer"]
 
 BLOCK_NAME = "ArtistParameters"
 _BLOCK_ALIGNMENT = 16
+"""Bytes that std140 rounds a block's size up to (OpenGL 4.6 core, 7.6.2.2, rule 9)."""
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 `vpltune fit --budget-ms` finds them, and every command draws with them unless a flag overrides one.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -11,9 +10,13 @@ from typing import Any
 from vpltune.renderer.errors import InputError
 
 INTERLEAVES = (1, 2, 4, 8)
+"""Sides of a block. A choice: 8² pixels are one workgroup of the gather."""
 MAP_REFINEMENTS = (1, 2, 4, 8)
+"""Rays along the side of a refined texel. A choice."""
 SMALLEST_MAP, LARGEST_MAP = 4, 64
+"""Texels along the side of a map. The largest map fills the 32 KiB of shared memory that every driver has."""
 SMALLEST_RSM, LARGEST_RSM = 64, 8192
+"""Texels along the side of a face. A choice: six faces of the largest need 2 GiB."""
 LONGEST_ADAPTATION = 1e4
 """Frames: nearly three minutes at 60 frames per second, far beyond any use."""
 LARGEST_SIDE = 16384
@@ -88,13 +91,23 @@ class Quality:
         return members
 
     @classmethod
-    def validated(cls, values: Any, where: str) -> "Quality":
+    def validated(cls, values: Any, where: str, others: tuple[str, ...] = ()) -> "Quality":
         """The part from a file's content; keys that are absent have their defaults.
+
+        Args:
+            values: the object without the members that others read.
+            where: names it in errors.
+            others: names of those members, for the list of known keys.
 
         Raises:
             InputError: not an object, an unknown key, or a value out of range.
         """
-        members = _members(values, tuple(cls.__dataclass_fields__), where)
+        members = _members(values, (*cls.__dataclass_fields__, *others), where)
+        for name in ("interleave", "map_size", "map_refinement", "rsm_resolution"):
+            if name in members:
+                members[name] = _integer(members[name])
+        if "rsm_resolution" in members:
+            _whole(members["rsm_resolution"], SMALLEST_RSM, LARGEST_RSM, f"{where}.rsm_resolution")
         if "budget" in members:
             members["budget"] = _budget(members["budget"], f"{where}.budget")
         # Checked before the object exists, so that the error names the file.
@@ -102,7 +115,8 @@ class Quality:
         for name, spec in cls.__dataclass_fields__.items():
             object.__setattr__(unchecked, name, members.get(name, spec.default))
         unchecked.check(where)
-        return cls(**members)
+        # As a float: programs write a whole one as 15 or as 15.0, and a checksum is of values.
+        return cls(**{**members, "adaptation_frames": float(unchecked.adaptation_frames)})
 
 
 def quality_schema(lloyd_iterations: dict[str, Any]) -> dict[str, Any]:
@@ -163,6 +177,7 @@ def _budget(values: Any, where: str) -> MetBudget:
         raise InputError(f"{where}.milliseconds: must be positive, got {milliseconds!r}")
     if not isinstance(size, list) or len(size) != 2:
         raise InputError(f"{where}.frame_size: must be [width, height], got {size!r:.60}")
+    size = [_integer(side) for side in size]
     for side in size:
         _whole(side, 1, LARGEST_SIDE, f"{where}.frame_size")
     if not isinstance(machine, str):
@@ -179,6 +194,11 @@ def _members(values: Any, known: tuple[str, ...], where: str) -> dict[str, Any]:
     return dict(values)
 
 
+def _integer(value: Any) -> Any:
+    """A whole number that is written as a fraction, 24.0, as an int; anything else as it is."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
 def _one_of(value: Any, allowed: tuple[int, ...], where: str) -> None:
     if isinstance(value, bool) or not isinstance(value, int) or value not in allowed:
         raise InputError(f"{where}: must be one of {', '.join(map(str, allowed))}, got {value!r:.60}")
@@ -190,6 +210,7 @@ def _whole(value: Any, low: int, high: int, where: str) -> None:
 
 
 def _number(value: Any, low: float, high: float, where: str) -> None:
-    number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    # False for NaN, and no conversion to float, which overflows on 10**400.
     if not number or not low <= value <= high:
         raise InputError(f"{where}: must be a number from {low:g} to {high:g}, got {value!r:.60}")

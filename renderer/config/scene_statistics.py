@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Statistic:
+    """One statistic: its name, and what it measures."""
+
     name: str
     meaning: str
 
@@ -35,9 +37,11 @@ STATISTICS: tuple[Statistic, ...] = (
 STATISTIC_NAMES = tuple(statistic.name for statistic in STATISTICS)
 
 RECEIVERS = 1024
+"""Pixels that statistics are measured at. A choice."""
 VPLS = 128
-"""VPLs that pairs are made with; each receiver takes every `STRIDE`-th."""
+"""VPLs that pairs are made with. A choice."""
 STRIDE = 4
+"""A receiver is paired with every fourth of them. A choice."""
 MOMENT_VPLS = 256
 """VPLs that stand for the lit places."""
 PARTNERS = 8

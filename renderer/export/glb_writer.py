@@ -13,9 +13,12 @@ from PIL import Image
 from vpltune.renderer.files.atomic_file import written_whole
 from vpltune.renderer.scene.scene import Light, Mesh, Scene, Texture
 
+# OpenGL's numbers, which glTF uses: glTF 2.0, "Accessor", "Buffer View" and "Sampler".
 _FLOAT, _UNSIGNED_INT = 5126, 5125
+# As above.
 _ARRAY_BUFFER, _ELEMENT_ARRAY_BUFFER = 34962, 34963
 _WRAPS = {"repeat": 10497, "mirrored_repeat": 33648, "clamp_to_edge": 33071}
+# As above.
 _LINEAR, _LINEAR_MIPMAP_LINEAR = 9729, 9987
 # glTF asks a camera for planes that ours have not: in the scene's diagonals, wide enough for any viewer.
 _NEAREST, _FARTHEST = 1e-4, 1e2

@@ -1,1 +1,1 @@
-"""Files: whole-or-nothing writes, images, video, strict JSON."""
+"""File access: atomic writes, images, video and strict JSON."""

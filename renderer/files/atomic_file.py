@@ -1,4 +1,4 @@
-"""Files written whole or not at all."""
+"""Atomic writes: a file is written completely or not at all."""
 
 import contextlib
 import os
@@ -11,13 +11,13 @@ from vpltune.renderer.errors import InputError
 
 @contextlib.contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
-    """Yield a temporary path beside `path`; on success it is synced and renamed over `path`.
+    """Yield a temporary path beside `path`; on success, sync it and rename it to `path`.
 
-    The temporary file keeps the suffix, so that image writers that look at it work. On any
-    exception, an interrupt among them, it is removed and `path` is left as it was.
+    The temporary file has the same suffix, because image writers may depend on it. On any exception or
+    interrupt, it is removed and `path` stays as it was.
 
     Raises:
-        InputError: the folder cannot be made or written to, or `path` is itself a folder.
+        InputError: the folder cannot be created or written to, or `path` is itself a folder.
     """
     path = Path(path)
     if path.is_dir():
@@ -40,6 +40,10 @@ def written_whole(path: Path) -> Iterator[Path]:
 
 
 def write_text_whole(path: Path, text: str) -> None:
-    """Write `text` as UTF-8 to `path`, whole or not at all."""
+    """Write `text` to `path` as UTF-8, atomically.
+
+    Raises:
+        InputError: the folder cannot be created or written to, or `path` is itself a folder.
+    """
     with written_whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

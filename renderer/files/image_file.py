@@ -1,4 +1,4 @@
-"""Images on disk: PNG for display, EXR for linear values; row 0 is at the top in both."""
+"""Image files: PNG for display, EXR for linear values. Row 0 is at the top in both."""
 
 from pathlib import Path
 from typing import Literal
@@ -13,10 +13,10 @@ from vpltune.renderer.files.atomic_file import written_whole
 
 
 def require_extension(path: Path, *extensions: str) -> str:
-    """The extension of `path` in lower case, if it is one of `extensions`; worth asking before long work.
+    """The extension of `path` in lower case, checked to be one of `extensions`. Call it before long work.
 
     Raises:
-        InputError: it is another.
+        InputError: the extension is not one of `extensions`.
     """
     extension = Path(path).suffix.lower()
     if extension not in extensions:
@@ -27,9 +27,9 @@ def require_extension(path: Path, *extensions: str) -> str:
 def write_png(
     path: Path, image: UInt8[np.ndarray, "height width 3"] | Float[np.ndarray, "height width 3"]
 ) -> None:
-    """Write a display-referred image (already sRGB-encoded) with 8 bits per channel.
+    """Write a display-referred, sRGB-encoded image with 8 bits per channel.
 
-    Floats are in [0, 1]: 1 is white, values beyond are clamped, and rounding is to the nearest step.
+    Floats are clamped to [0, 1], where 1 is white, and rounded to the nearest step.
 
     Raises:
         InputError: the name does not end in .png, a float is NaN, or the path cannot be written to.
@@ -37,7 +37,7 @@ def write_png(
     require_extension(path, ".png")
     if image.dtype != np.uint8:
         if np.isnan(image).any():
-            raise InputError(f"{path}: the image holds NaN, which no PNG can show")
+            raise InputError(f"{path}: the image must not hold NaN, which a PNG cannot store")
         image = np.round(np.clip(image, 0.0, 1.0) * 255.0).astype(np.uint8)
     with written_whole(Path(path)) as temporary:
         Image.fromarray(image, "RGB").save(temporary, optimize=False)
@@ -48,9 +48,9 @@ def write_exr(
     pixels: Float32[np.ndarray, "height width 3"] | Float32[np.ndarray, "height width"],
     channel: Literal["Y", "Z"] = "Y",
 ) -> None:
-    """Write linear values as float32: channels R, G and B, or one channel that `channel` names.
+    """Write linear values as float32 to the channels R, G and B, or to the single channel `channel`.
 
-    Z is depth and Y luminance in the names that OpenEXR recommends. NaN and infinity are kept.
+    OpenEXR recommends the names Z for depth and Y for luminance. NaN and infinity are kept.
 
     Raises:
         InputError: the name does not end in .exr, or the path cannot be written to.
@@ -65,10 +65,10 @@ def write_exr(
 def read_exr(
     path: Path,
 ) -> Float32[np.ndarray, "height width 3"] | Float32[np.ndarray, "height width"]:
-    """Read channels R, G and B (alpha is left out), or else the only channel, as float32.
+    """Read the channels R, G and B, without alpha, or else the only channel, as float32.
 
     Raises:
-        InputError: not a readable EXR file, or its channels are others.
+        InputError: the name does not end in .exr, the file is not a readable EXR, or it has other channels.
     """
     require_extension(path, ".exr")
     if not Path(path).is_file():

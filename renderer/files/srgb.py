@@ -5,13 +5,13 @@ from jaxtyping import Float
 
 
 def srgb_from_linear(linear: Float[np.ndarray, "*shape"]) -> Float[np.ndarray, "*shape"]:
-    """Linear values in [0, 1] to sRGB-encoded ones; what lies outside is clamped to it first."""
+    """Encode linear values as sRGB. Values outside [0, 1] are clamped first."""
     clamped = np.clip(linear, 0.0, 1.0)
     encoded = np.where(clamped <= 0.0031308, 12.92 * clamped, 1.055 * clamped ** (1.0 / 2.4) - 0.055)
     return encoded.astype(linear.dtype)
 
 
 def linear_from_srgb(encoded: Float[np.ndarray, "*shape"]) -> Float[np.ndarray, "*shape"]:
-    """sRGB-encoded values in [0, 1] to linear ones."""
+    """Decode sRGB values in [0, 1] to linear values."""
     linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
     return linear.astype(encoded.dtype)

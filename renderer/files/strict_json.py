@@ -1,4 +1,4 @@
-"""JSON that every reader takes: numbers that are not finite become null."""
+"""Strict JSON: writing without NaN and Infinity, and reading without repeated keys."""
 
 import json
 import math
@@ -7,19 +7,24 @@ from typing import Any
 
 
 def strict_json(document: Mapping[str, Any], indent: int | None = 2) -> str:
-    """`document` as JSON text without NaN or Infinity, which JSON lacks; `indent` None: in one line."""
+    """`document` as JSON text. Numbers that are not finite become null, since JSON has none.
+
+    Args:
+        document: the values.
+        indent: spaces per level; None writes one line.
+    """
     return json.dumps(_finite(document), indent=indent, allow_nan=False)
 
 
 class DuplicateKeyError(ValueError):
-    """A key appears twice in one JSON object. Its text is the key."""
+    """A key appears twice in one JSON object. The message is the key."""
 
 
 def unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """The `object_pairs_hook` of a strict reader: the standard one keeps the last of two equal keys.
+    """An `object_pairs_hook` for `json.loads` that rejects repeated keys. By default, the last one wins.
 
     Raises:
-        DuplicateKeyError: two keys are equal.
+        DuplicateKeyError: a key appears twice.
     """
     members: dict[str, Any] = {}
     for key, value in pairs:

@@ -1,4 +1,4 @@
-"""Clips on disk: an H.264 .mp4, or a folder of numbered .png files."""
+"""Video files: an H.264 .mp4, or a folder of numbered .png files."""
 
 import contextlib
 from collections.abc import Callable, Iterator
@@ -13,17 +13,17 @@ from vpltune.renderer.files.atomic_file import written_whole
 from vpltune.renderer.files.image_file import write_png
 
 QUALITY = 8
-"""Of imageio-ffmpeg's 0 to 10: next to no visible loss."""
+"""A choice: quality on imageio-ffmpeg's scale of 0 to 10, with hardly any visible loss."""
 
 Image = UInt8[np.ndarray, "height width 3"]
 
 
 def check_clip_path(path: Path, size: tuple[int, int]) -> None:
-    """Refuse what cannot be a clip of `size` = (width, height), before any of it is drawn.
+    """Check that a clip of `size` = (width, height) pixels can be written to `path`. Call it before drawing.
 
     Raises:
-        InputError: neither an .mp4 nor a folder, a file where the folder should be, or an odd size for an
-            .mp4, whose colours have half the resolution.
+        InputError: the path is neither an .mp4 nor a folder, or an .mp4 would have an odd width or height
+            (its chroma has half the resolution).
     """
     suffix = path.suffix.lower()
     if suffix == ".mp4":
@@ -32,18 +32,23 @@ def check_clip_path(path: Path, size: tuple[int, int]) -> None:
     elif suffix:
         raise InputError(f"{path}: a clip must be an .mp4 or a folder for .png files, got {suffix!r}")
     elif path.exists() and not path.is_dir():
-        raise InputError(f"{path}: must be a folder for .png files, and is a file")
+        raise InputError(f"{path}: must be a folder for .png files, got a file")
 
 
 @contextlib.contextmanager
 def clip_writer(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Image], None]]:
-    """Yield a function that takes the frames one by one; none is kept.
+    """Yield a function that writes one frame per call.
 
-    An .mp4 appears when the block ends well, whole or not at all. In a folder, each frame is whole, and
-    those written before an interrupt stay; frames of the same number are written anew.
+    An .mp4 is written atomically when the block ends without an exception. In a folder, each frame is written
+    atomically, frames stay after an interrupt, and existing frames with the same number are replaced.
+
+    Args:
+        path: an .mp4 or a folder.
+        size: width and height in pixels.
+        fps: frames per second of an .mp4.
 
     Raises:
-        InputError: see `check_clip_path`, or the place cannot be written to.
+        InputError: `check_clip_path` rejects the path, or it cannot be written to.
         MachineError: the encoder fails.
     """
     check_clip_path(path, size)
@@ -69,7 +74,7 @@ def _encoder(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable
         fps=fps,
         codec="libx264",
         quality=QUALITY,
-        # Two divides every even size; the library's 16 would stretch the image.
+        # The default of 16 would resize the image unless 16 divides both sides. They are even, so 2 does.
         macro_block_size=2,
         output_params=["-movflags", "+faststart"],
         ffmpeg_log_level="error",

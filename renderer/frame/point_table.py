@@ -14,8 +14,8 @@ R2_STEPS = (1.0 / _PLASTIC_NUMBER, 1.0 / _PLASTIC_NUMBER**2)
 """What is added from each point of the R2 sequence to the next, modulo 1."""
 
 POISSON_RADIUS = 0.75
-"""Of Poisson discs, in 1/√count. Darts thrown until none fits end near 0.83 (packing density 0.547, Tanemura
-1979); 0.75 is reached for certain after some tens of darts for each point."""
+"""Radius of the Poisson discs, in 1/√count. Darts thrown until none fits end near 0.83 (packing density
+0.547, Tanemura 1979); 0.75 is reached for certain after some tens of darts for each point."""
 
 
 def r2_sequence(count: int) -> Float32[np.ndarray, "count 2"]:

@@ -9,6 +9,7 @@ RSM_RESOLUTION = 1024
 RSM_RESOLUTION_OF_MANY = 512
 """The same with more than `FEW_FACES`: a point light has six."""
 FEW_FACES = 2
+"""Faces up to which each has the full resolution. A choice: two lamps, or a lamp and a sun."""
 
 
 def rsm_resolution(lights: tuple[Light, ...], quality: Quality | None = None) -> int:

@@ -7,18 +7,19 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 TEXEL_BYTES = 8
 """A distance and a packed normal, or the place of finer texels: shaders/common/vpl_visibility.glsl."""
 VISIBILITY_LIFT = 0.01
+"""Rays start, and distances count, from a point lifted off the VPL's surface by this many footprints."""
 VISIBILITY_LEAST_LIFT = 1e-3
-"""Rays start, and distances count, from a point lifted off the VPL's surface: by so many footprints, and by
-this share of L at least. What an RSM holds lies off its surface by as much as interpolated depth rounds, some
-1e-4 of L, and a VPL behind its own surface would see nothing else."""
+"""And by this share of L at least. Interpolated RSM depth is off by about 1e-4 L, and a VPL behind its own
+surface would see nothing else."""
 FRAME_TURNS_OVER = -0.5
-"""Of a normal's z: where the tangents of a map turn over. Not at 0, where walls have their normals, and where
+"""The z of a normal below which a map's tangents turn over. Not 0, where walls have their normals and
 rounding would decide."""
 _LARGEST_SHARE = 0.4
-"""Of the texels, how many may be cast finer. 3 to 12 % are at a silhouette in rooms, 28 % in the busiest of
-sixteen scenes. Where there is no room left texels stay coarse: which ones, may differ from frame to frame."""
+"""Share of the texels that may be refined. 3 to 12 % of a room's texels are at a silhouette, 28 % in the
+busiest of sixteen scenes. Beyond that, texels stay coarse, and which ones may differ from frame to frame."""
 _MOST_DETAIL_BYTES = 1 << 27
-"""What every driver takes in one storage buffer: with blocks of 4², some 18,000 default maps of a room."""
+"""Bytes that every driver takes in one storage buffer: with blocks of 4², about 18,000 default maps of a
+room."""
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Bounds of a disc of light, for `shaders/common/vpl_disc.glsl` and its twin `tuner.surrogate.vpl_disc`."""
 
 LEAST_PART = 1e-4
-"""Of a disc's area over a receiver's horizon, below which it gives nothing: the share has two digits left."""
+"""Share of a disc's area over a receiver's horizon below which it gives nothing: it has two digits left."""
 LEAST_RADIUS = 1e-6
 """In L: dark VPLs have no footprint."""
 FADE_HEIGHT = 1e-3

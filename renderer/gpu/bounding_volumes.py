@@ -21,7 +21,9 @@ item, or the first node of its pair of children."""
 LEAF_ITEMS = 4
 """At most so many items in a leaf; fewer where the surface-area estimate says that a split pays."""
 
+# Neighbours along the Morton curve that a cluster looks at, on either side. A choice.
 _REACH = 2
+# Bits of a Morton code along an axis. A choice: finer than any box that rays tell apart.
 _MORTON_BITS = 16
 # The surface-area estimate's price of one item, in prices of opening one pair of nodes.
 _ITEM_COST = 1.0

@@ -13,6 +13,7 @@ REQUIRED_VERSION = 450
 MOST_BINDINGS = 16
 """Most resources that one of our programs declares, rounded up; OpenGL 4.5 guarantees 8 storage buffers."""
 
+# From gl.xml, the registry of OpenGL; moderngl has no names for them.
 _GL_LOWER_LEFT = 0x8CA1
 _GL_ZERO_TO_ONE = 0x935F
 _GL_TEXTURE_2D = 0x0DE1
@@ -20,7 +21,7 @@ _GL_DEPTH_COMPONENT = 0x1902
 _GL_DEPTH_COMPONENT32F = 0x8CAC
 _GL_FLOAT = 0x1406
 
-GL_SRGB8 = 0x8C41
+GL_SRGB8 = 0x8C41  # as above
 
 
 def create_context() -> moderngl.Context:

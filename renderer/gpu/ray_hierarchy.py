@@ -24,8 +24,9 @@ from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
 from vpltune.renderer.scene.scene import Mesh, Scene
 
-_MESH_DEPTH = 40
-_TOP_DEPTH = 21
+# Levels of a mesh's tree, and of the tree over instances; deeper parts become larger leaves. Choices, which
+# set the stack of a ray.
+_MESH_DEPTH, _TOP_DEPTH = 40, 21
 
 RAY_DEFINES = {
     "RAY_COUNT_BITS": COUNT_BITS,

@@ -30,6 +30,7 @@ _COMMAND_DTYPE = np.dtype(
     [("count", "u4"), ("instances", "u4"), ("first", "u4"), ("base_vertex", "i4"), ("base_instance", "u4")]
 )
 _MAX_ANISOTROPY = 8.0
+"""Samples of a texture along its longer direction. A choice."""
 
 SCENE_READS = ("scene_instances", "skin_influences", "joint_matrices", "base_color_texture")
 """What a program declares that draws the scene."""

@@ -1,4 +1,4 @@
-"""Playing a scene's animation: where its instances, joints, lights and cameras stand at a time."""
+"""Animation playback: the transforms of instances, joints, lights and cameras at a given time."""
 
 from dataclasses import dataclass, replace
 
@@ -10,26 +10,27 @@ from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE
 from vpltune.renderer.scene.scene import Camera, Light, Scene, trs_matrices, without_scale
 from vpltune.renderer.scene.scene_animation import Animation, Channel
 
-# Below this angle [rad] the sine in slerp's denominator has lost its digits, and the chord is the arc.
+# Radians. Below this angle, slerp divides by a sine near zero, so it interpolates linearly instead. The chord
+# then differs from the arc by less than 1e-8.
 _SMALLEST_ARC = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """A scene at one moment; what no channel moves is as `Scene` has it."""
+    """A scene at one moment. Whatever no channel moves is as in `Scene`."""
 
     transforms: Float64[np.ndarray, "instances 4 4"]
-    """To world; of instances that a skin places, the identity."""
+    """Instance to world; the identity for instances that a skin places."""
     joint_matrices: Float64[np.ndarray, "joints 4 4"]
-    """Each joint's world matrix times its inverse bind matrix, skin after skin."""
+    """World matrix times inverse bind matrix of each joint, skin after skin."""
     lights: tuple[Light, ...]
     cameras: tuple[Camera, ...]
 
 
 class AnimationPlayer:
-    """Poses of one scene. Every clip repeats without end, each in its own time.
+    """Computes the pose of a scene at any time. Every clip loops forever, with its own period.
 
-    All channels of a kind are evaluated at once, and the hierarchy a level at a time.
+    It evaluates all channels of the same kind at once, and the hierarchy one level at a time.
     """
 
     def __init__(self, scene: Scene):
@@ -48,15 +49,15 @@ class AnimationPlayer:
         self._rest_transforms = np.array([instance.to_world for instance in scene.instances])
 
     def pose_at(self, seconds: float) -> Pose:
-        """The scene `seconds` after the start.
+        """The pose `seconds` after the start.
 
         Raises:
-            InputError: the motion leaves the range of coordinates.
+            InputError: a world matrix exceeds the range of coordinates, `LARGEST_COORDINATE`.
         """
         return self._pose(seconds)
 
     def rest_pose(self) -> Pose:
-        """The scene at rest."""
+        """The pose without animation: that of the scene file's nodes."""
         return self._pose(None)
 
     def _pose(self, seconds: float | None) -> Pose:
@@ -111,7 +112,7 @@ class AnimationPlayer:
 
 @dataclass(frozen=True, eq=False)
 class _Track:
-    """Channels of one property, interpolation and number of keys, evaluated together."""
+    """Channels with the same property, interpolation and number of keys, evaluated together."""
 
     animated: str
     interpolation: str
@@ -122,7 +123,7 @@ class _Track:
     tangents: Float64[np.ndarray, "channels keys 2 components"] | None
 
     def values_at(self, seconds: float) -> Float64[np.ndarray, "channels components"]:
-        """glTF 2.0 appendix C; before its first key and after its last a channel holds still."""
+        """The channels' values (glTF 2.0 appendix C), constant before the first key and after the last."""
         time = np.zeros_like(self.durations)
         np.mod(seconds, self.durations, out=time, where=self.durations > 0.0)
         key_count = self.times.shape[1]
@@ -148,11 +149,20 @@ class _Track:
 def slerp(
     first: Float64[np.ndarray, "n 4"], second: Float64[np.ndarray, "n 4"], share: Float64[np.ndarray, "n 1"]
 ) -> Float64[np.ndarray, "n 4"]:
-    """From one rotation to another along the shorter arc at constant speed (Shoemake 1985)."""
+    """Spherical interpolation of quaternions along the shorter arc at constant speed (Shoemake 1985).
+
+    Args:
+        first: quaternions (x, y, z, w) of any non-zero length.
+        second: likewise.
+        share: 0 gives `first`, 1 gives `second` or its negative.
+
+    Returns:
+        Unit quaternions, to within 1e-8.
+    """
     first = first / np.linalg.norm(first, axis=1, keepdims=True)
     second = second / np.linalg.norm(second, axis=1, keepdims=True)
     cosine = np.sum(first * second, axis=1, keepdims=True)
-    # q and −q are the same rotation: the nearer of the two is meant.
+    # q and −q are the same rotation; take the nearer one.
     second = np.where(cosine < 0.0, -second, second)
     angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
     sine = np.where(angle < _SMALLEST_ARC, 1.0, np.sin(angle))
@@ -170,7 +180,7 @@ def _hermite(
     share: np.ndarray,
     span: np.ndarray,
 ) -> np.ndarray:
-    """Cubic Hermite spline, glTF 2.0 appendix C.5; tangents are per second, `span` in seconds."""
+    """Cubic Hermite spline (glTF 2.0 appendix C.5). Tangents are per second, `span` is in seconds."""
     square, cube = share**2, share**3
     return (
         (2.0 * cube - 3.0 * square + 1.0) * first
@@ -181,7 +191,7 @@ def _hermite(
 
 
 def _never_zero(quaternions: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """A spline of quaternions may pass through zero, no rotation: there the key before it stands in."""
+    """The quaternions, with `before` in place of zero ones: a spline may pass through zero."""
     return np.where(np.linalg.norm(quaternions, axis=1, keepdims=True) > 0.0, quaternions, before)
 
 
@@ -205,7 +215,7 @@ def _tracks(channels: tuple[Channel, ...]) -> list[_Track]:
 
 
 def _levels(animation: Animation) -> list[Int64[np.ndarray, " rows"]]:
-    """Rows of nodes by depth: each level's parents are in the level above."""
+    """Node indices grouped by depth, so that the parents of each level are in the level above."""
     depth = np.zeros(len(animation.parents), np.int64)
     for row, parent in enumerate(animation.parents):
         depth[row] = depth[parent] + 1 if parent >= 0 else 0

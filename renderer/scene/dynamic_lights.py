@@ -1,8 +1,8 @@
-"""Thousands of small direct lights without shadows: point and spot, each with a range.
+"""Dynamic lights: thousands of small point and spot lights with a finite range and without shadows.
 
-Irradiance at distance d on a surface at angle θ is I·cos θ·cone·w(d)/d², with the window
-w = max(min(1 − (d/range)⁴, 1), 0) that KHR_lights_punctual recommends under "Range Property", so that a
-light reaches no further than `range`. The cone is that of `renderer.scene.scene.Light`.
+Irradiance at distance d on a surface at angle θ is I·cos θ·cone·w(d)/d². The window
+w = max(min(1 − (d/range)⁴, 1), 0) is the one that KHR_lights_punctual recommends under "Range Property"; it
+ends the light at `range`. The cone factor is that of `renderer.scene.scene.Light`.
 Twin: shaders/common/dynamic_lights.glsl.
 """
 
@@ -21,26 +21,38 @@ DYNAMIC_LIGHT_DTYPE = np.dtype(
         ("cone_scale", "f4"),
     ]
 )
-"""One light as the shaders read it (std430). range: world units. intensity: W/sr, linear. cos_outer and
-cone_scale = 1/(cos inner − cos outer) make the cone: clamp((cos θ − cos_outer)·cone_scale, 0, 1)²."""
+"""One light in the layout of the shaders (std430). `range` is in world units, `intensity` in linear W/sr.
+
+With cone_scale = 1/(cos inner − cos outer), the cone factor is clamp((cos θ − cos_outer)·cone_scale, 0, 1)².
+"""
 
 POINT_COS_OUTER = -2.0
-"""Below every cosine: with cone_scale 1 the cone of a point light is 1 in all directions."""
+"""Less than any cosine, so with a cone_scale of 1 a point light's cone factor is 1 in all directions."""
 
 MIN_DISTANCE = 2.0**-9
-"""In ranges. Nearer than this a light grows no brighter: a half float holds no more (see
-`_accumulation_unit`), and only pixels that a light is about to touch are concerned."""
+"""Smallest distance used for the 1/d² falloff, in units of the light's range.
 
-# Half floats keep full precision from 2⁻¹⁴ to 2¹⁶. The light of the largest I/range² gives at most
-# I/range²/MIN_DISTANCE² = 2¹⁸·I/range². With its I/range² at 2⁻⁴ four such lights may stand on one point, and
-# one 1,000 times as weak still keeps full precision where it gives its own I/range².
+It bounds irradiance to what a half float holds (see `_UNIT_IN_STRONGEST`). Only pixels that a light almost
+touches are affected.
+"""
+
+# The accumulation unit, in units of the largest I/range² of all lights. Half floats have full precision from
+# 2⁻¹⁴ to 2¹⁶. The strongest light gives at most I/range²/MIN_DISTANCE² = 2¹⁸·I/range². Storing its I/range²
+# as 2⁻⁴ leaves room for four such lights at one point, and a light 1,000 times weaker still has full
+# precision where it gives its own I/range².
 _UNIT_IN_STRONGEST = 2.0**4
 
 
 def point_lights(
     positions_world: Float64[np.ndarray, "n 3"], intensity: np.ndarray, range_world: np.ndarray | float
 ) -> np.ndarray:
-    """Records of point lights; `intensity` [W/sr] is [n, 3] or [3], `range_world` [n] or one number."""
+    """Records of point lights, [n] of `DYNAMIC_LIGHT_DTYPE`.
+
+    Args:
+        positions_world: world units.
+        intensity: W/sr, linear, of shape [n, 3] or [3].
+        range_world: world units, of shape [n] or one number.
+    """
     records = np.zeros(len(positions_world), DYNAMIC_LIGHT_DTYPE)
     records["position_world"] = positions_world
     records["intensity"] = intensity
@@ -59,13 +71,24 @@ def spot_lights(
     inner_cone: float,
     outer_cone: float,
 ) -> np.ndarray:
-    """Records of spot lights; directions are unit vectors along the light.
+    """Records of spot lights, [n] of `DYNAMIC_LIGHT_DTYPE`.
+
+    Args:
+        positions_world: world units.
+        intensity: W/sr, linear, of shape [n, 3] or [3].
+        range_world: world units, of shape [n] or one number.
+        directions_world: unit vectors in which the light travels.
+        inner_cone: half angle in radians.
+        outer_cone: half angle in radians.
 
     Raises:
-        ValueError: not 0 ≤ inner < outer ≤ π/2 (half angles, radians).
+        ValueError: 0 ≤ inner_cone < outer_cone ≤ π/2 does not hold.
     """
     if not 0.0 <= inner_cone < outer_cone <= math.pi / 2:
-        raise ValueError(f"spot_lights: 0 ≤ inner < outer ≤ π/2 must hold, got {inner_cone} and {outer_cone}")
+        raise ValueError(
+            f"spot_lights: cone angles must satisfy 0 ≤ inner < outer ≤ π/2, "
+            f"got {inner_cone} and {outer_cone}"
+        )
     records = point_lights(positions_world, intensity, range_world)
     records["direction_world"] = directions_world
     records["cos_outer"] = math.cos(outer_cone)
@@ -74,7 +97,7 @@ def spot_lights(
 
 
 def scaled_records(records: np.ndarray, factor: float) -> np.ndarray:
-    """The lights of a scene `factor` times as large: the same irradiance at the corresponding points."""
+    """The records for a scene scaled by `factor`: they give corresponding points the same irradiance."""
     grown = records.copy()
     grown["position_world"] *= np.float32(factor)
     grown["range"] *= np.float32(factor)
@@ -83,7 +106,7 @@ def scaled_records(records: np.ndarray, factor: float) -> np.ndarray:
 
 
 class DynamicLights:
-    """What shines this frame. Give new records to `update` before a frame; the runtime uploads them.
+    """The dynamic lights of a frame. Call `update` with new records before a frame; the runtime uploads them.
 
     Example:
         >>> lights = DynamicLights(point_lights(positions, np.full(3, 0.1), 0.5))
@@ -94,11 +117,13 @@ class DynamicLights:
         self.update(records)
 
     def update(self, records: np.ndarray) -> None:
-        """Take `records` [n] of `DYNAMIC_LIGHT_DTYPE`, which are kept, not copied, if points come first.
+        """Replace the lights by `records`, [n] of `DYNAMIC_LIGHT_DTYPE`.
+
+        Point lights are sorted before spots. Records already in that order are kept without a copy.
 
         Raises:
-            ValueError: another dtype or shape, a range that is not positive, an intensity that is negative,
-                or a number that is not finite.
+            ValueError: the dtype or shape is wrong, a range is not positive, an intensity is negative, or a
+                number is not finite.
         """
         if records.dtype != DYNAMIC_LIGHT_DTYPE or records.ndim != 1:
             raise ValueError(
@@ -111,7 +136,7 @@ class DynamicLights:
         if not (numbers[:, 3] > 0.0).all():
             raise ValueError(f"DynamicLights: every range must be positive, got {numbers[:, 3].min()}")
         if not (numbers[:, 4:7] >= 0.0).all():
-            raise ValueError(f"DynamicLights: no intensity may be negative, got {numbers[:, 4:7].min()}")
+            raise ValueError(f"DynamicLights: every intensity must be ≥ 0, got {numbers[:, 4:7].min()}")
         is_point = numbers[:, 7] < -1.0
         self.point_count = int(np.count_nonzero(is_point))
         if not is_point[: self.point_count].all():
@@ -124,15 +149,15 @@ class DynamicLights:
 
     @property
     def spot_count(self) -> int:
-        """Spots follow the points."""
+        """Number of spot lights. They follow the point lights."""
         return len(self.numbers) - self.point_count
 
 
 def _accumulation_unit(numbers: np.ndarray) -> float:
-    """Irradiance [W/m²] that the half-float accumulation buffer holds as 1.
+    """Irradiance in W/m² that the half-float accumulation buffer stores as 1.
 
-    It comes from the lights alone and is a power of two: nothing is measured or rounded, and lights and scene
-    scaled together leave every stored number as it is.
+    It is a power of two, so scaling by it does not round. It depends on the lights alone, and on them only
+    through I/range², so the stored numbers do not change if lights and scene are scaled together.
     """
     if not len(numbers):
         return 1.0

@@ -1,4 +1,4 @@
-"""How lights become RSM views: one face for a narrow spot or the sun, six for everything wider."""
+"""The RSM faces of lights: one for a narrow spot or the sun, five for a wide spot, six for a point light."""
 
 import math
 from dataclasses import dataclass
@@ -9,6 +9,7 @@ from jaxtyping import Float64
 from vpltune.renderer.scene.scene import Light
 
 KIND_CODES = {"spot": 0, "point": 1, "directional": 2}
+"""Light kinds as numbers in `position_kind.w`; shaders/common/lights.glsl reads them."""
 
 LIGHT_DTYPE = np.dtype(
     [
@@ -18,6 +19,7 @@ LIGHT_DTYPE = np.dtype(
         ("faces", "i4", 4),
     ]
 )
+"""A light in shaders/common/lights.glsl (std430). `faces` holds the first face and the number of faces."""
 FACE_DTYPE = np.dtype(
     [
         ("light_to_world", "f4", (4, 4)),
@@ -28,12 +30,20 @@ FACE_DTYPE = np.dtype(
         ("padding", "i4", 3),
     ]
 )
+"""An RSM face in shaders/common/lights.glsl (std430).
+
+`extent` is tan of the half field of view, or half the width and height in world units if the face is
+orthographic. `near_or_range` is the near plane, or the depth range of an orthographic face, in world units.
+"""
 
 WIDEST_SINGLE_FACE = math.radians(60.0)
-"""Half angle up to which a spot fits one perspective face; beyond, tan θ spends the texels on the rim."""
+"""A choice: widest half angle of a spot that gets a single perspective face.
+
+Beyond it, most texels of the face would go to the rim of the cone, since extent grows with tan θ.
+"""
 
 NEAR_PLANE = 1e-4
-"""Near plane of perspective faces and of the camera, in scene radii."""
+"""A choice: near plane of perspective faces and of the camera, in scene radii (half diagonals)."""
 
 _CUBE = np.array(
     [
@@ -46,42 +56,50 @@ _CUBE = np.array(
     ],
     np.float64,
 )
-"""Rotations whose −Z axes (third columns negated) are ∓X, ∓Y, ∓Z."""
+"""Rotations of the six cube faces, whose −Z axes are +X, −X, +Y, −Y, −Z and +Z in turn."""
 
 
 SIZE_STEP = 2.0**0.125
-"""Ratio of one size of a snapped face to the next: at most a twelfth of the texels' density is given up."""
+"""A choice: ratio of consecutive sizes of a snapped face. It costs at most 1/12 of the texels per axis."""
 
 
 @dataclass(frozen=True)
 class FaceSnapping:
-    """How an orthographic face keeps its grid in the world while bounds move."""
+    """Snapping of an orthographic face to a world-space grid, so texels do not crawl while bounds change."""
 
     length: float
-    """What sizes are steps of: of the scene at rest, so that every scale of a scene has the same steps."""
+    """A length of the scene at rest, world units. Sizes are steps from it, so they scale with the scene."""
     cells: int
-    """Along the side of a face; it moves by whole ones."""
+    """Grid cells along the side of a face. The face moves by whole cells."""
 
 
 @dataclass(frozen=True)
 class LightRecords:
-    """Lights and faces as the shaders read them (shaders/common/lights.glsl)."""
+    """Lights and faces in the layout that shaders/common/lights.glsl reads."""
 
     lights: np.ndarray
+    """[lights] of `LIGHT_DTYPE`."""
     faces: np.ndarray
+    """[faces] of `FACE_DTYPE`."""
     moment_origin: tuple[float, float, float]
-    """A point near the light: sums of squared distances lose least precision from there."""
+    """Origin of the first face, world units. Sums of squared distances from it lose little precision."""
 
 
 def face_count(lights: tuple[Light, ...]) -> int:
-    """How many RSM faces the lights have, wherever they are."""
+    """Number of RSM faces of the lights. It depends on their kinds and cones only."""
     return sum(_face_count(light) for light in lights)
 
 
 def light_records(
     lights: tuple[Light, ...], bounds: Float64[np.ndarray, "2 3"], snapping: FaceSnapping | None = None
 ) -> LightRecords:
-    """Lay out lights and RSM faces for a scene within `bounds` (low and high corner, world units)."""
+    """Records of the lights and their RSM faces, for a scene within `bounds`.
+
+    Args:
+        lights: the lights of a view.
+        bounds: low and high corner of the scene, world units.
+        snapping: snaps orthographic faces to a grid; None fits them tightly to `bounds`.
+    """
     records = np.zeros(len(lights), LIGHT_DTYPE)
     faces: list[np.ndarray] = []
     for index, light in enumerate(lights):
@@ -102,7 +120,7 @@ def light_records(
 def _face_count(light: Light) -> int:
     if light.kind == "point":
         return 6
-    # No spot reaches behind itself: of its cube, the last face would stay dark.
+    # A spot does not light what is behind it, so its sixth cube face would stay dark.
     return 5 if light.kind == "spot" and light.outer_cone > WIDEST_SINGLE_FACE else 1
 
 
@@ -122,13 +140,13 @@ def _faces(light: Light, index: int, bounds: np.ndarray, snapping: FaceSnapping 
 
 
 def _sun_face(light: Light, index: int, bounds: np.ndarray, snapping: FaceSnapping | None) -> np.ndarray:
-    """An orthographic face that holds all of `bounds`, as seen along the light."""
+    """An orthographic face along the light that contains all of `bounds`."""
     rotation = _rotation_along(light.direction_world)
     selector = np.array([[(corner >> axis) & 1 for axis in range(3)] for corner in range(8)])
     corners = bounds[selector, np.arange(3)] @ rotation
     low, high = corners.min(axis=0), corners.max(axis=0)
-    # One percent of room, of the whole size: a flat scene has no depth, and what touches the bounds must
-    # not fall on a tile's border.
+    # A margin of 1 % of the diagonal: a flat scene has no depth of its own, and surfaces on the bounds must
+    # not fall on the border of the tile.
     room = 0.01 * float(np.linalg.norm(high - low))
     extent = (high - low) / 2.0 + room
     front = (low + high) / 2.0
@@ -139,8 +157,8 @@ def _sun_face(light: Light, index: int, bounds: np.ndarray, snapping: FaceSnappi
 
 
 def _snapped(extent: np.ndarray, center: np.ndarray, snapping: FaceSnapping) -> tuple[np.ndarray, np.ndarray]:
-    """The next larger size, and the nearest place on that size's grid about the world's origin."""
-    # A place is rounded by half a cell, 1/cells of the extent.
+    """The extent rounded up to a size step, and the centre rounded to the grid of that size."""
+    # Rounding moves the centre by up to half a cell, which is 1/cells of the extent.
     needed = extent * (1.0 + 1.0 / (snapping.cells - 1.0))
     steps = np.ceil(np.log(needed / snapping.length) / math.log(SIZE_STEP))
     extent = snapping.length * SIZE_STEP**steps
@@ -169,15 +187,15 @@ def _face(
 
 
 def _rotation_along(direction: np.ndarray) -> Float64[np.ndarray, "3 3"]:
-    """A rotation whose −Z axis is `direction` (unit).
+    """A rotation whose −Z axis is the unit vector `direction` (Frisvad 2012).
 
-    It follows the direction without a jump and with little roll, so that a light that turns carries its
-    texels along: Frisvad 2012, with the one direction that any such rule must except straight up.
+    It varies smoothly with the direction and rolls little, so the texels of a turning light turn with it.
+    Every such rule has one singular direction; here it is straight up.
     """
     x, y, z = (-float(component) for component in direction)
     if y < -1.0 + 1e-9:
         return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    # Written out, because np.cross takes longer than all the rest of a frame's lights.
+    # Written out because np.cross takes longer than the rest of this module in a frame.
     shear = x / (1.0 + y)
     right = (1.0 - x * shear, -x, -z * shear)
     length = math.hypot(*right)

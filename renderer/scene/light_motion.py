@@ -1,8 +1,8 @@
-"""Lights that bounce through a scene: gravity, and elastic reflection off its surfaces and bounds.
+"""Lights that bounce through a scene under gravity, reflected elastically by its surfaces and bounds.
 
-Everything happens in voxels of the scene's free-space grid, so a scene and the same scene at another scale
-have the same motion. Time goes by in ticks of fixed length and positions between ticks are interpolated:
-where a light is hangs on the time alone, not on how it was cut into frames.
+The simulation runs in voxel units of the scene's free-space grid, so the motion does not depend on the scale
+of the scene. It advances in ticks of fixed length and interpolates positions between ticks, so the position
+of a light depends on the time alone and not on the frame rate.
 """
 
 import math
@@ -16,31 +16,38 @@ from vpltune.renderer.scene.placement.sight import light_hits, mean_square_dista
 from vpltune.renderer.scene.scene import Light, Scene
 
 SPEED = 0.15
-"""Of a light when it sets out, in longest sides of the grid per second."""
+"""A choice: initial speed of a light, in longest grid sides per second."""
 GRAVITY = 0.15
-"""In longest sides of the grid per second², downwards (−Y)."""
+"""A choice: downward (−Y) acceleration, in longest grid sides per second²."""
 LONGEST_STEP = 0.5
-"""In voxels per tick: a surface one voxel thick is not jumped over."""
+"""Longest move in one tick, in voxels. At half a voxel no light jumps over a surface one voxel thick."""
 OVERLAP = 6.0
-"""Lights whose reach a free place lies in, on average."""
+"""A choice: mean number of lights within whose range a point of free space lies."""
 LARGEST_RANGE = 0.25
-"""In longest sides of the scene."""
+"""A choice: upper bound of that automatic range, in longest grid sides."""
 SPOT_CONE = (math.radians(20.0), math.radians(35.0))
+"""A choice: inner and outer half angle of the spots, radians."""
 SPOT_SHARE = 0.25
+"""A choice: share of the lights that are spots."""
 SPOT_RANGE = 2.0
-"""Of a spot's range to a point light's: its flux goes one way."""
+"""A choice: range of a spot in ranges of a point light. Its flux is concentrated, so it reaches farther."""
 
 BRIGHTNESS = 0.125
+"""A choice: irradiance from all moving lights, relative to that from the view's lights (`flux_beside`)."""
 
 
 class BouncingLights:
-    """`count` lights on their way through a scene.
+    """`count` lights that move through a scene. `SPOT_SHARE` of them are spots, pointed along their velocity.
 
-    Colours, places and directions come from `seed`. A quarter are spots, which shine the way they fly.
+    `records` holds the lights at the current time, [count] of `DYNAMIC_LIGHT_DTYPE`, points before spots.
 
     Args:
-        flux: of all lights together, in each channel on average [W].
-        range_world: of the point lights, in world units; None has `OVERLAP` of them reach any free place.
+        scene: gives the surfaces and bounds that reflect the lights.
+        count: number of lights.
+        seed: decides colours, starting positions and directions.
+        flux: radiant flux of all lights together in W, mean of the three channels.
+        range_world: range of the point lights in world units. None chooses it such that, on average,
+            `OVERLAP` lights reach a point of free space.
     """
 
     def __init__(self, scene: Scene, count: int, seed: int, flux: float, range_world: float | None = None):
@@ -65,14 +72,14 @@ class BouncingLights:
         self._place_records()
 
     def advance(self, seconds: float) -> None:
-        """Move on; `records` are then those of the new time."""
+        """Advance the time by `seconds` and update `records`."""
         self._seconds += seconds
         while self._ticks < self._seconds / self._tick_seconds:
             self._tick()
         self._place_records()
 
     def _tick(self) -> None:
-        """One leapfrog step, or a reflection in place of it: reversible either way, so that energy stays."""
+        """A leapfrog step, or a reflection instead of it. Both are reversible, which conserves energy."""
         self._ticks += 1
         self._before = self._position.copy()
         mean_velocity = self._velocity - (0.0, 0.5 * self._fall, 0.0)
@@ -97,16 +104,16 @@ class BouncingLights:
         mean_velocity: Float64[np.ndarray, "m 3"],
         voxel: Int64[np.ndarray, " m"],
     ) -> Float64[np.ndarray, "m 3"]:
-        """Velocities mirrored about the surface in the voxels that lights are about to enter."""
+        """Velocities reflected by the surfaces in the voxels that the lights are about to enter."""
         backwards = -mean_velocity / np.linalg.norm(mean_velocity, axis=1, keepdims=True)
         normal = self._space.normals.reshape(-1, 3)[voxel].astype(np.float64)
         length = np.linalg.norm(normal, axis=1, keepdims=True)
-        # Where faces oppose each other in a voxel there is no one normal: back the way it came.
+        # A voxel with opposing faces has no single normal, so the light goes back the way it came.
         normal = np.where(length > 0.5, normal / np.maximum(length, 0.5), backwards)
-        # Surfaces are solid from both sides: the side counts that the light is on.
+        # Surfaces reflect on both sides: flip the normal to the side that the light is on.
         normal *= np.copysign(1.0, (normal * backwards).sum(axis=1, keepdims=True))
         along = (velocity * normal).sum(axis=1, keepdims=True)
-        # Slower than one tick's fall, a light would be drawn back before it has left.
+        # A light slower than one tick of gravity would fall back before it has left the surface.
         return velocity + (np.maximum(abs(along), self._fall) - along) * normal
 
     def _voxels(self, positions: Float64[np.ndarray, "n 3"]) -> Int64[np.ndarray, " n"]:
@@ -116,13 +123,13 @@ class BouncingLights:
 
     def _make_records(self, rng: np.random.Generator, flux: float, range_world: float) -> np.ndarray:
         count, spots = len(self._position), self._spot_count
-        # One channel low, one high, one between, in any order: saturated, and each the same in sum.
+        # Saturated colours: one low, one high and one middle channel in random order, with a mean of 1.
         color = rng.permuted(np.column_stack([np.full(count, 0.1), rng.uniform(0.2, 1.6, count)]), axis=1)
         color = np.column_stack([color, 3.0 - color.sum(axis=1)])
         color = rng.permuted(color, axis=1) * (flux / max(count, 1))
         where = np.zeros((count, 3))
         points = point_lights(where[spots:], color[spots:] / (4.0 * math.pi), range_world)
-        # A spot's flux as if it were evenly bright to its outer cone.
+        # A spot's flux, approximated as uniform intensity out to the outer cone.
         solid_angle = 2.0 * math.pi * (1.0 - math.cos(SPOT_CONE[1]))
         return np.concatenate(
             [
@@ -153,7 +160,7 @@ def _free_places(
     count: int,
     rng: np.random.Generator,
 ) -> Float64[np.ndarray, "count 3"]:
-    """Random points of random empty voxels within the scene's bounds; anywhere within where none is empty."""
+    """Random points in empty voxels within the bounds, or anywhere within them if no voxel is empty."""
     cell = np.argwhere(~space.occupied)
     cell = cell[((cell >= low) & (cell + 1.0 <= high)).all(axis=1)]
     if not len(cell):
@@ -162,17 +169,17 @@ def _free_places(
 
 
 def _range_for_overlap(space: FreeSpace, count: int) -> float:
-    """Range at which spheres around `count` lights cover the free space `OVERLAP` times, in world units."""
+    """Range at which the spheres of `count` lights cover free space `OVERLAP` times, in world units."""
     free = max(1, int(np.count_nonzero(~space.occupied)))
     radius = (OVERLAP * free / (4.0 / 3.0 * math.pi * max(1, count))) ** (1.0 / 3.0)
     return min(radius, LARGEST_RANGE * max(space.shape)) * space.voxel_world
 
 
 def flux_beside(scene: Scene, lights: tuple[Light, ...]) -> float:
-    """Flux [W] with which moving lights stand out beside a view's own lights, and do not outshine them.
+    """Flux in W, mean of the channels, at which moving lights are visible beside a view's own lights.
 
-    It brings the scene's surfaces, on average, to `BRIGHTNESS` of what the view's lights bring to those that
-    they meet (π W/m² where they meet none), mean of the channels.
+    Spread over all surfaces, it gives `BRIGHTNESS` times the irradiance that the view's lights give the
+    surfaces that they reach, or times π W/m² if they reach none.
     """
     space = free_space(scene)
     irradiance = sum(_irradiance_met(space, light) for light in lights) or math.pi
@@ -181,7 +188,7 @@ def flux_beside(scene: Scene, lights: tuple[Light, ...]) -> float:
 
 
 def _irradiance_met(space: FreeSpace, light: Light) -> float:
-    """At the root mean square distance of what a light meets [W/m²]; 0 where it meets nothing."""
+    """Irradiance in W/m² at the RMS distance of the surfaces a light reaches; 0 if it reaches none."""
     level = float(light.intensity.mean())
     if light.kind == "directional":
         return level

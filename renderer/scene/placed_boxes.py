@@ -1,4 +1,4 @@
-"""Bounds of a moving scene without looking at its vertices: boxes that move as what they hold does."""
+"""Bounds of a moving scene from boxes that move with its instances and joints, instead of all vertices."""
 
 from dataclasses import dataclass
 
@@ -7,32 +7,34 @@ from jaxtyping import Float64, Int64
 
 from vpltune.renderer.scene.scene import Scene
 
+# The corners of a box: which of its two bounds each takes along each axis.
 _CORNERS = np.array([[(corner >> axis) & 1 for axis in range(3)] for corner in range(8)])
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedBoxes:
-    """Boxes in the space of an instance or a joint, and which of their matrices places each."""
+    """Boxes in the local space of an instance or joint, each with the index of the matrix that places it."""
 
     corners: Float64[np.ndarray, "boxes 8 3"]
     matrices: Int64[np.ndarray, " boxes"]
-    """Row among the transforms of all instances, followed by all joint matrices."""
+    """Index into the transforms of all instances, followed by all joint matrices."""
 
     def bounds(
         self,
         transforms: Float64[np.ndarray, "instances 4 4"],
         joint_matrices: Float64[np.ndarray, "joints 4 4"],
     ) -> Float64[np.ndarray, "2 3"]:
-        """Low and high corner of a box around everything, world units."""
+        """Low and high corner of an axis-aligned box around all boxes, world units."""
         to_world = np.concatenate([transforms, joint_matrices])[self.matrices]
         placed = self.corners @ to_world[:, :3, :3].transpose(0, 2, 1) + to_world[:, None, :3, 3]
         return np.stack([placed.min(axis=(0, 1)), placed.max(axis=(0, 1))])
 
 
 def placed_boxes(scene: Scene) -> PlacedBoxes:
-    """A box for each instance; of a skinned one, a box for each joint around the vertices that follow it.
+    """One box for each instance, or for a skinned instance one for each joint, around the vertices it moves.
 
-    Blending places a vertex between where its joints would, so that the joints' boxes hold it.
+    Linear blend skinning puts a vertex between the positions that each of its joints alone would give it. A
+    box around the joints' boxes therefore contains it.
     """
     skins = () if scene.animation is None else scene.animation.skins
     first_joints = len(scene.instances) + np.cumsum([0] + [len(skin.joints) for skin in skins])

@@ -1,7 +1,7 @@
-"""What a scene is, in plain arrays: the one description that runtime and reference share.
+"""A scene in plain arrays: meshes, materials, textures, lights and cameras.
 
-Every surface is two-sided and diffuse. Positions are in world units; nothing else in the program
-is. Colours are linear reflectance or radiance in the Rec. 709 primaries unless a name says sRGB.
+The runtime and the reference renderer share this description. Every surface is diffuse and two-sided.
+Lengths are in world units. Colours are linear, in the Rec. 709 primaries, unless a name says sRGB.
 """
 
 from dataclasses import dataclass, field, replace
@@ -18,9 +18,9 @@ LightKind = Literal["spot", "point", "directional"]
 
 @dataclass(frozen=True, eq=False)
 class Texture:
-    """An image of base colour, as stored: sRGB-encoded bytes, row 0 at the top (v = 0, as in glTF).
+    """A base-colour image: sRGB-encoded bytes, row 0 at the top (v = 0, as in glTF).
 
-    It is always looked up with bilinear filtering, of decoded (linear) texels.
+    Lookups decode the texels to linear values first, then filter them bilinearly.
     """
 
     name: str
@@ -31,7 +31,10 @@ class Texture:
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """Albedo = base_color · texture(uv) · vertex colour, each 1 where absent; in [0, 1]."""
+    """A diffuse material: albedo = base_color · texture(uv) · vertex colour.
+
+    An absent texture or vertex colour counts as 1. `base_color` is linear, in [0, 1].
+    """
 
     name: str
     base_color: Float32[np.ndarray, "3"]
@@ -41,10 +44,10 @@ class Material:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles of one material, in the mesh's own space.
+    """Triangles with one material, in the mesh's local space.
 
-    `normals` are unit length, and the file's own where it has them (else flat). `uv` has any
-    KHR_texture_transform applied. `colors` are linear.
+    `normals` have unit length. They come from the file; without any there, shading is flat. `uv` already
+    includes any KHR_texture_transform. `colors` are linear.
     """
 
     name: str
@@ -56,7 +59,7 @@ class Mesh:
     material: int
     """Index into `Scene.materials`."""
     skinning: Skinning | None = None
-    """Where an animation bends the mesh; positions and normals are then those of the scene at rest."""
+    """The joints that deform the mesh, if they are animated. Positions and normals are then the rest pose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,18 +74,20 @@ class Instance:
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A pinhole. `to_world` is rigid: the camera looks along its −Z, with +Y up."""
+    """A pinhole camera. `to_world` is rigid; the camera looks along its −Z axis, with +Y up."""
 
     to_world: Float64[np.ndarray, "4 4"]
     yfov: float
-    """Full vertical angle of view in radians, in (0, π)."""
+    """Full vertical field of view in radians, in (0, π)."""
 
     @property
     def position_world(self) -> Float64[np.ndarray, "3"]:
+        """The camera's position in world units."""
         return self.to_world[:3, 3]
 
     @property
     def world_to_camera(self) -> Float64[np.ndarray, "4 4"]:
+        """The inverse of `to_world`."""
         rotation = self.to_world[:3, :3]
         inverse = np.eye(4)
         inverse[:3, :3] = rotation.T
@@ -92,29 +97,30 @@ class Camera:
 
 @dataclass(frozen=True, eq=False)
 class Light:
-    """A punctual light (KHR_lights_punctual), radiometric: candela are W/sr, lux are W/m².
+    """A punctual light as in KHR_lights_punctual, in radiometric units: W/sr for candela, W/m² for lux.
 
-    A spot's intensity falls from `inner_cone` to `outer_cone` (half angles, radians) as
-    KHR_lights_punctual says: clamp((cos θ − cos outer)/(cos inner − cos outer), 0, 1)².
+    A spot's intensity falls off between `inner_cone` and `outer_cone` (half angles in radians,
+    0 ≤ inner < outer ≤ π/2) by the factor clamp((cos θ − cos outer)/(cos inner − cos outer), 0, 1)², as
+    KHR_lights_punctual specifies.
 
     Raises:
-        ValueError: the direction of a light that has one is not of unit length.
+        ValueError: the direction of a spot or directional light does not have unit length.
     """
 
     kind: LightKind
     intensity: Float64[np.ndarray, "3"]
-    """W/sr for spot and point, W/m² across the beam for directional."""
+    """RGB: W/sr for spot and point lights, W/m² perpendicular to the beam for directional lights."""
     position_world: Float64[np.ndarray, "3"] = field(default_factory=lambda: np.zeros(3))
-    """Unused by a directional light."""
+    """World units. A directional light ignores it."""
     direction_world: Float64[np.ndarray, "3"] = field(default_factory=lambda: np.array([0.0, 0.0, -1.0]))
-    """Unit vector, the way the light travels; unused by a point light."""
+    """Unit vector in which the light travels. A point light ignores it."""
     inner_cone: float = 0.0
     outer_cone: float = float(np.pi / 4)
     name: str = ""
 
     def __post_init__(self) -> None:
         length = float(np.linalg.norm(self.direction_world))
-        # 1e-4: as far as single precision and numbers written with five digits are off.
+        # 1e-4 tolerates single precision and numbers written with five digits.
         if self.kind != "point" and not abs(length - 1.0) <= 1e-4:
             raise ValueError(
                 f"Light.direction_world: must be a unit vector, got {self.direction_world.tolist()} "
@@ -124,7 +130,7 @@ class Light:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Geometry, materials, and what lights and cameras the file itself brings (often none)."""
+    """Geometry, materials, and the lights and cameras in the file (often none)."""
 
     name: str
     meshes: tuple[Mesh, ...]
@@ -134,15 +140,16 @@ class Scene:
     lights: tuple[Light, ...] = ()
     cameras: tuple[Camera, ...] = ()
     warnings: tuple[str, ...] = ()
-    """One line for each thing in the file that is ignored or approximated."""
+    """One line for each kind of content in the file that is ignored or approximated."""
     animation: Animation | None = None
-    """How it moves; everything else here is the scene at rest."""
+    """The motion, if any. All other fields describe the rest pose."""
 
     def triangle_count(self) -> int:
+        """Triangles of all instances; a mesh counts once per instance."""
         return sum(len(self.meshes[instance.mesh].triangles) for instance in self.instances)
 
     def bounds(self) -> Float64[np.ndarray, "2 3"]:
-        """Axis-aligned bounds over all placed vertices, world units: rows are low and high corner."""
+        """Axis-aligned bounds of all instances in world units: the low corner, then the high corner."""
         corners = [
             transform_points(instance.to_world, self.meshes[instance.mesh].positions)
             for instance in self.instances
@@ -158,16 +165,17 @@ class Scene:
 def transform_points(
     matrix: Float64[np.ndarray, "4 4"], points: Float32[np.ndarray, "n 3"] | Float64[np.ndarray, "n 3"]
 ) -> Float64[np.ndarray, "n 3"]:
-    """Affine map of points, in double precision."""
+    """The points mapped by an affine matrix, in double precision."""
     return points.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def transform_normals(
     matrix: Float64[np.ndarray, "4 4"], normals: Float32[np.ndarray, "n 3"]
 ) -> Float64[np.ndarray, "n 3"]:
-    """Unit normals under an affine map: by the cofactor matrix, which also serves mirrored nodes.
+    """Unit normals transformed by the cofactor matrix of an affine map.
 
-    A normal whose image is zero (a node scaled flat) stays zero.
+    The cofactor matrix equals det(M)·M⁻ᵀ. It also exists for singular maps, and it keeps normals on the right
+    side of mirrored surfaces. A normal that maps to zero, as on a node scaled flat, stays zero.
     """
     linear = matrix[:3, :3]
     cofactors = np.stack(
@@ -183,7 +191,7 @@ def trs_matrices(
     rotation: Float64[np.ndarray, "n 4"],
     scale: Float64[np.ndarray, "n 3"],
 ) -> Float64[np.ndarray, "n 4 4"]:
-    """translation · rotation · scale; quaternions (x, y, z, w) of any length but zero."""
+    """The matrices translation · rotation · scale. Quaternions are (x, y, z, w), of any non-zero length."""
     x, y, z, w = (rotation / np.linalg.norm(rotation, axis=1, keepdims=True)).T
     matrices = np.zeros((len(scale), 4, 4))
     matrices[:, 0, :3] = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], axis=1)
@@ -196,10 +204,10 @@ def trs_matrices(
 
 
 def without_scale(to_world: Float64[np.ndarray, "4 4"]) -> Float64[np.ndarray, "4 4"] | None:
-    """The rigid motion that keeps position, −Z direction and the plane of −Z and +Y.
+    """The rigid transform with the same position, −Z direction and plane of −Z and +Y.
 
     Returns:
-        None where the matrix is so flat that it leaves no such plane.
+        None if the matrix is so flat that −Z and +Y no longer span a plane.
     """
     depth = np.linalg.norm(to_world[:3, 2])
     if not depth > 0.0:
@@ -221,9 +229,9 @@ def look_at(
     target: Float64[np.ndarray, "3"],
     up: Float64[np.ndarray, "3"] | None = None,
 ) -> Float64[np.ndarray, "4 4"]:
-    """Camera-to-world matrix of a camera at `eye` that looks at `target` along its −Z, +Y up.
+    """Camera-to-world matrix of a camera at `eye` that looks at `target` along its −Z axis, with +Y up.
 
-    `up` defaults to world +Y, and to world −Z where the view is vertical to within 2.5 degrees.
+    `up` defaults to world +Y, or to world −Z if the view direction is within 2.5 degrees of vertical.
 
     Raises:
         ValueError: `eye` and `target` coincide.
@@ -248,9 +256,9 @@ def look_at(
 
 
 def scaled(scene: Scene, factor: float) -> Scene:
-    """The same scene `factor` times as large, lights included.
+    """The scene scaled by `factor`, lights and cameras included.
 
-    Point and spot intensities grow with factor², so that irradiance, and the image, stay the same.
+    Point and spot intensities are scaled by factor², so irradiance and the image stay the same.
     """
     grow = np.diag([factor, factor, factor, 1.0])
     return Scene(
@@ -269,7 +277,7 @@ def scaled(scene: Scene, factor: float) -> Scene:
 
 
 def scaled_light(light: Light, factor: float) -> Light:
-    """The light of a scene `factor` times as large: the same irradiance at the corresponding points."""
+    """The light for a scene scaled by `factor`: it gives corresponding points the same irradiance."""
     power = 1.0 if light.kind == "directional" else factor**2
     return Light(
         kind=light.kind,
@@ -283,7 +291,7 @@ def scaled_light(light: Light, factor: float) -> Light:
 
 
 def scaled_camera(camera: Camera, factor: float) -> Camera:
-    """The camera of a scene `factor` times as large: the same framing."""
+    """The camera for a scene scaled by `factor`: it frames the same image."""
     to_world = camera.to_world.copy()
     to_world[:3, 3] *= factor
     return Camera(to_world, camera.yfov)

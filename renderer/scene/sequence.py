@@ -1,4 +1,4 @@
-"""A scene over time: where things, lights and camera are at every frame of a clip."""
+"""A scene over time: the view and the pose at every frame of a clip."""
 
 import math
 from dataclasses import dataclass, replace
@@ -13,15 +13,16 @@ from vpltune.renderer.scene.views import View, scaled_view
 
 Motion = Literal["auto", "none", "light", "camera", "both"]
 MOTIONS: tuple[Motion, ...] = get_args(Motion)
+"""Every value of `Motion`."""
 
 MOTION_SECONDS = 8.0
-"""Once round and back to the start, so that a clip of this length repeats without a seam."""
+"""A choice: period of the added motions in seconds. A clip of this length loops seamlessly."""
 LIGHT_TURN = math.radians(15.0)
-"""A spot or directional light circles about the way it shines at the start, this far off its middle."""
+"""A choice: half angle of the cone on which the direction of a spot or directional light circles, radians."""
 LIGHT_SWAY = 0.04
-"""Radius of a point light's circle, in diagonals of the scene."""
+"""A choice: radius of the circle that a point light moves on, in scene diagonals."""
 CAMERA_TURN = math.radians(10.0)
-"""To either side, about what the camera looks at."""
+"""A choice: how far the camera swings to either side around its target, radians."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,15 +31,18 @@ class Moment:
 
     view: View
     pose: Pose
-    """Where instances and joints are; the lights and cameras that count are the view's."""
+    """Transforms of instances and joints. Use the lights and the camera of `view`, not those of the pose."""
 
 
 class Sequence:
-    """The animation of a scene, with light and camera moved besides where asked for.
+    """A scene's animation, plus an optional added motion of the lights and the camera.
 
-    Camera and lights of `view` that are the scene's own follow its animation, and are known by being the
-    very same objects. `motion` is added to them; "auto" moves light and camera where the scene has no
-    animation, and nothing where it has one. Moments are those of the scene `factor` times as large.
+    Args:
+        scene: the scene, at its original scale.
+        view: the starting view. Its camera and lights follow the animation if they are the very objects in
+            `scene.cameras` and `scene.lights`.
+        motion: what moves in addition. "auto" is "both" if the scene has no animation, else "none".
+        factor: moments are those of the scene scaled by this factor.
     """
 
     def __init__(self, scene: Scene, view: View, motion: Motion = "auto", factor: float = 1.0):
@@ -56,10 +60,10 @@ class Sequence:
         self._target = _looked_at(view.camera, (low + high) / 2.0)
 
     def at(self, seconds: float) -> Moment:
-        """The moment that many seconds after the start.
+        """The moment `seconds` after the start.
 
         Raises:
-            InputError: the animation leaves the range of coordinates.
+            InputError: a world matrix of the animation exceeds the range of coordinates.
         """
         pose = self._player.pose_at(seconds)
         camera = self._view.camera if self._followed_camera is None else pose.cameras[self._followed_camera]
@@ -86,7 +90,10 @@ def _index_of(wanted: object, among: tuple) -> int | None:
 
 
 def _looked_at(camera: Camera, center: Float64[np.ndarray, "3"]) -> Float64[np.ndarray, "3"]:
-    """The point of the camera's axis that is nearest to the scene's centre, but before the camera."""
+    """The point in front of the camera, on its axis, that is nearest to the centre of the scene.
+
+    It is at least a quarter of the distance to the centre away.
+    """
     forward = -camera.to_world[:3, 2]
     distance = float(np.dot(center - camera.position_world, forward))
     reach = float(np.linalg.norm(center - camera.position_world))
@@ -94,7 +101,7 @@ def _looked_at(camera: Camera, center: Float64[np.ndarray, "3"]) -> Float64[np.n
 
 
 def _circled(light: Light, phase: float, radius: float) -> Light:
-    """The light part of the way round its circle; at phase 0 it stands where it was."""
+    """The light at `phase` (radians) of its circle; phase 0 is the light unchanged."""
     if light.kind == "point":
         offset = radius * np.array([math.cos(phase) - 1.0, 0.0, math.sin(phase)])
         return replace(light, position_world=light.position_world + offset)
@@ -108,7 +115,7 @@ def _circled(light: Light, phase: float, radius: float) -> Light:
 
 
 def _swung(camera: Camera, target: Float64[np.ndarray, "3"], angle: float) -> Camera:
-    """The camera turned about the vertical through `target`."""
+    """The camera rotated by `angle` (radians) about the vertical axis through `target`."""
     cosine, sine = math.cos(angle), math.sin(angle)
     turn = np.eye(4)
     turn[:3, :3] = [[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]]

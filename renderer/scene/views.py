@@ -1,4 +1,4 @@
-"""Views: a camera, an image size and the lights that shine, kept in `views.json` in world units."""
+"""Views: a camera, an image size and lights, stored in `views.json` in world units."""
 
 import json
 import math
@@ -14,14 +14,15 @@ from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.renderer.scene.scene import Camera, Light, scaled_camera, scaled_light
 
 Split = Literal["fitted", "validation", "held_out"]
-"""What a view is for: `fitted` views are fitted to, `validation` views choose between the candidates of a
-fit, `held_out` views choose nothing and are only measured."""
+"""What a view is for. Parameters are fitted to `fitted` views, `validation` views choose between the
+candidates of a fit, and `held_out` views choose nothing: error is only measured on them."""
 SPLITS: tuple[Split, ...] = get_args(Split)
+"""Every value of `Split`."""
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """One image to make: rays go through pixel centres, row 0 is at the top."""
+    """One image to render. Rays go through pixel centres; row 0 is at the top."""
 
     name: str
     split: Split
@@ -32,7 +33,7 @@ class View:
 
 
 def scaled_view(view: View, factor: float) -> View:
-    """The view of a scene `factor` times as large."""
+    """The view for a scene scaled by `factor`: camera and lights are scaled, the image stays the same."""
     return View(
         view.name,
         view.split,
@@ -56,7 +57,7 @@ def ray_directions_world(view: View) -> Float64[np.ndarray, "height width 3"]:
 
 
 def light_to_json(light: Light) -> dict[str, Any]:
-    """A light as it stands in `views.json`."""
+    """A light in the form of `views.json`. World units, W/sr or W/m², radians."""
     return {
         "type": light.kind,
         "position": light.position_world.tolist(),
@@ -68,7 +69,7 @@ def light_to_json(light: Light) -> dict[str, Any]:
 
 
 def views_to_json(scene_path: str, views: tuple[View, ...]) -> dict[str, Any]:
-    """The contents of `views.json`; every length in world units, every angle in radians."""
+    """The contents of `views.json`. Lengths are in world units, angles in radians."""
     return {
         "scene": scene_path,
         "views": [
@@ -85,7 +86,11 @@ def views_to_json(scene_path: str, views: tuple[View, ...]) -> dict[str, Any]:
 
 
 def write_views(path: Path, scene_path: str, views: tuple[View, ...]) -> None:
-    """Write `views.json`, whole or not at all."""
+    """Write `views.json` atomically.
+
+    Raises:
+        InputError: the path cannot be written to.
+    """
     write_text_whole(path, json.dumps(views_to_json(scene_path, views), indent=2) + "\n")
 
 
@@ -93,7 +98,7 @@ def read_views(path: str | Path) -> tuple[View, ...]:
     """Read `views.json`.
 
     Raises:
-        InputError: the file cannot be read, or a key is missing, of the wrong shape or not finite.
+        InputError: the file cannot be read or is not JSON, or a key is missing or its value is not allowed.
     """
     try:
         document = json.loads(Path(path).read_text(encoding="utf-8"))
@@ -111,9 +116,9 @@ def _view_from_json(entry: Any, where: str) -> View:
     camera = _member(entry, "camera", where)
     to_world = _numbers(camera, "to_world", 16, f"{where}.camera").reshape(4, 4)
     rotation = to_world[:3, :3]
-    # 1e-4: matrices printed with five digits pass, a scaled or sheared camera does not.
+    # 1e-4 accepts matrices printed with five digits, and rejects scale and shear.
     if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-4 or np.linalg.det(rotation) < 0.0:
-        raise InputError(f"{where}.camera.to_world: must be a rotation and a translation, row by row")
+        raise InputError(f"{where}.camera.to_world: must be a rigid 4 × 4 matrix, row by row")
     yfov = float(_numbers(camera, "yfov", 1, f"{where}.camera")[0])
     if not 0.0 < yfov < math.pi:
         raise InputError(f"{where}.camera.yfov: must lie in (0, π) radians, got {yfov}")
@@ -159,7 +164,16 @@ def _light_from_json(entry: Any, where: str) -> Light:
 
 
 def check_cone(inner_cone: float, outer_cone: float, where: str) -> None:
-    """Raises InputError unless 0 ≤ inner < outer ≤ π/2, the rule of KHR_lights_punctual."""
+    """Check the half angles of a spot, in radians, against the rule of KHR_lights_punctual.
+
+    Args:
+        inner_cone: radians.
+        outer_cone: radians; 1e-6 above π/2 is accepted, the rounding of single precision.
+        where: file and key, for the message.
+
+    Raises:
+        InputError: 0 ≤ inner_cone < outer_cone ≤ π/2 does not hold.
+    """
     if not 0.0 <= inner_cone < outer_cone <= math.pi / 2 + 1e-6:
         raise InputError(
             f"{where}: cone angles must satisfy 0 ≤ inner < outer ≤ π/2, got {inner_cone} and {outer_cone}"
@@ -177,7 +191,7 @@ def _member(entry: Any, key: str, where: str) -> Any:
 def _numbers(entry: Any, key: str, count: int, where: str) -> Float64[np.ndarray, " count"]:
     value = _member(entry, key, where)
     items = value if isinstance(value, list) else [value]
-    # bool is an int to Python; JSON's 1e999 arrives as infinity and NaN as itself.
+    # Python's json reads 1e999 as infinity and NaN as NaN, and bool is a subclass of int.
     plain = all(isinstance(item, int | float) and not isinstance(item, bool) for item in items)
     if not plain or len(items) != count or not all(abs(item) <= 1e30 for item in items):
         raise InputError(

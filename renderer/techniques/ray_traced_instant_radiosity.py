@@ -19,6 +19,7 @@ from vpltune.renderer.techniques.gathered_vpls import VPL_DTYPE, GatheredVpls
 MIN_COSINE = 0.02
 """Bounds the area that a ray stands for at grazing incidence, as RSM_MIN_COSINE does for a texel."""
 _TRIANGLES_AT_ONCE = 4096
+"""Triangles that all rays are tried against at once. A choice, for memory."""
 
 
 class RayTracedInstantRadiosity:

@@ -1,15 +1,20 @@
-// A learnt prior: parameters as a small function of the scene's statistics, eased over time. One workgroup, one
-// invocation for each parameter. Twin: renderer/config/auto_prior.py.
+// Auto parameters: a learnt prior sets the artist parameters from the scene statistics, eased over time.
+//
+// Reads: the scene statistics, the prior's weights, the state of the last frame.
+// Writes: the artist parameters that the prior knows, and the state. One workgroup, one invocation for each parameter.
+// Constants: AUTO_COUNT and STATISTIC_COUNT, from renderer/frame/passes/auto_parameters.py.
+// Python: renderer/frame/passes/auto_parameters.py; renderer/config/auto_prior.py holds the formula, clamp(W s + b).
+// Twin: tuner/prior/prior_training.py.
 #include "common/scene_statistics.glsl"
 
 layout(local_size_x = AUTO_COUNT) in;
 
-// An axis of the unit cube, from the parameter table.
+// The range of one parameter: an axis of the unit cube.
 struct AutoAxis {
     float low;
     float high;
-    int logarithmic;
-    int place;  // index of the parameter in the block
+    int logarithmic;  // 1 or 0
+    int place;        // index of the parameter in the parameter block
 };
 
 layout(std430, binding = AUTO_PRIOR_BINDING) readonly buffer AutoPriorWeights {
@@ -21,18 +26,19 @@ layout(std430, binding = AUTO_PRIOR_BINDING) readonly buffer AutoPriorWeights {
 };
 
 layout(std430, binding = AUTO_STATE_BINDING) buffer AutoState {
-    int started;
-    float point[AUTO_COUNT];  // in the unit cube, as of the last frame
+    int started;              // 0 before the first frame
+    float point[AUTO_COUNT];  // the parameters in the last frame, in the unit cube
 };
 
-// The block of common/artist_parameters.glsl, of which all members take four bytes.
+// The block of common/artist_parameters.glsl as an array: every member takes four bytes.
 layout(std430, binding = ARTIST_PARAMETERS_BINDING) buffer ArtistParameterValues {
     float parameter_values[];
 };
 
-uniform float adaptation;  // share of the way to the target that a frame goes, in (0, 1]; 1 goes all of it
-uniform float largest_step;  // of an axis, that a frame goes at most
+uniform float adaptation;    // share of the way to the target that one frame moves, in (0, 1]
+uniform float largest_step;  // the most that one frame moves, as a share of the axis
 
+// Where the prior wants a parameter, in the unit cube.
 float target_of(int index) {
     float target = bias[index];
     for (int s = 0; s < STATISTIC_COUNT; ++s) {

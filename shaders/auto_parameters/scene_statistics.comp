@@ -1,4 +1,10 @@
-// How receivers stand to VPLs, part 1: sums over the receivers of a workgroup, one for each invocation.
+// Scene statistics, part 1: how receivers relate to VPLs, summed over the receivers of a workgroup.
+//
+// Reads: G-buffer, VPLs, frame statistics, and visibility maps if VISIBILITY_MAP_SIZE > 0.
+// Writes: `receiver_sums`, one for each workgroup. One invocation for each receiver, a pixel.
+// Constants: STATISTICS_* and R2_STEP_* of renderer/frame/passes/scene_statistics.py; the counts come from
+// renderer/config/scene_statistics.py, which explains each statistic.
+// Python: renderer/frame/passes/scene_statistics.py. Twin: tuner/surrogate/scene_statistics.py.
 #include "common/gbuffer.glsl"
 #include "common/scene_length.glsl"
 #include "common/scene_statistics.glsl"
@@ -17,8 +23,8 @@ uniform int vpl_count;
 
 shared ReceiverSums sums[STATISTICS_GROUP_SIZE];
 
-// Of the light that would arrive if nothing stood between, the share that a VPL's map lets through. With the
-// table's own bias and softness, not the frame's: what is measured must not follow from what it sets.
+// Share of a VPL's unoccluded light that its visibility map lets through; 1 without maps. Bias and softness are the
+// table's defaults and not the frame's, because these statistics set the frame's.
 float seen(Receiver receiver, VirtualPointLight vpl, int index) {
 #if VISIBILITY_MAP_SIZE > 0
     return vpl_visibility(
@@ -30,10 +36,12 @@ float seen(Receiver receiver, VirtualPointLight vpl, int index) {
 #endif
 }
 
+// The sums of one receiver, over every STATISTICS_STRIDE-th VPL from `first`. The weight of a pair is
+// Φ cosθ_x cosθ_j/(d² + l²).
 ReceiverSums measured(Receiver receiver, int first, int end) {
     ReceiverSums result = NO_RECEIVERS;
     float light = 0.0;
-    vec3 weighed = vec3(0.0); // visible, near, distance
+    vec3 weighed = vec3(0.0);  // sums of visible, near and range, weighted by light
     for (int j = first; j < end; j += STATISTICS_STRIDE) {
         VirtualPointLight vpl = virtual_point_lights[j];
         vec3 to_vpl = vpl.position_footprint.xyz - receiver.position_world;
@@ -44,7 +52,8 @@ ReceiverSums measured(Receiver receiver, int first, int end) {
         float form = cosines / distance_squared / (distance_squared + footprint_squared);
         float weight = flux * form * scene_length * scene_length;
         result.pairs += 1.0;
-        // 1e-4 of both cosines together: on one plane, rounding says which pairs face each other.
+        // 1e-4 is a choice for the product of both cosines. Below it, receiver and VPL lie in one plane, and rounding
+        // decides whether they face each other.
         if (weight > 0.0 && cosines > 1e-4 * distance_squared) {
             result.facing += 1.0;
             light += weight;
@@ -72,6 +81,7 @@ void main() {
     int lane = int(gl_LocalInvocationIndex);
     int index = int(gl_GlobalInvocationID.x);
     ivec2 size = textureSize(gbuffer_depth, 0);
+    // The R2 sequence (Roberts 2018): evenly spread pixels, the same ones in every frame.
     vec2 point = fract(0.5 + float(index) * vec2(R2_STEP_X, R2_STEP_Y));
     Receiver receiver = gbuffer_receiver(min(ivec2(point * vec2(size)), size - 1));
     bool lit = total_flux > 0.0;

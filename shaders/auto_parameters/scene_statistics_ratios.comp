@@ -1,4 +1,9 @@
-// How receivers stand to VPLs, part 2, and how the lit places lie: from sums to ratios. One workgroup.
+// Scene statistics, part 2: from sums over receivers, and from moments of the lit VPLs, to ratios. One workgroup.
+//
+// Reads: `receiver_sums` of part 1, VPLs, frame statistics. Writes: `scene_statistics`.
+// Constants: STATISTICS_* and STATISTIC_* of renderer/frame/passes/scene_statistics.py. The 16 that divides log2 of the
+// VPL count is log2 of the largest count, 65,536.
+// Python: renderer/frame/passes/scene_statistics.py. Twin: tuner/surrogate/scene_statistics.py.
 #include "common/scene_length.glsl"
 #include "common/scene_statistics.glsl"
 #include "common/virtual_point_lights.glsl"
@@ -11,13 +16,13 @@ layout(std430, binding = VIRTUAL_POINT_LIGHTS_BINDING) readonly buffer VirtualPo
 
 uniform int vpl_count;
 
-// Moments of the lit places, in units of L about the first VPL; weighed by flux where it says so.
+// Sums over the lit VPLs. Positions are in units of L, relative to the first VPL. Φ is a VPL's share of the total flux.
 struct Moments {
     vec4 position_flux;   // Σ Φ·position, ΣΦ
     vec3 squares;         // Σ Φ·(xx, yy, zz)
     vec3 products;        // Σ Φ·(xy, xz, yz)
     vec3 normal;          // Σ Φ·normal
-    vec4 pairs;           // Σ cosθ_i·cosθ_j, pairs; Σ l/(l + L), lit VPLs
+    vec4 pairs;           // Σ cosθ_i·cosθ_j over pairs of VPLs, number of pairs; Σ l/(l + L), number of lit VPLs
 };
 
 shared Moments sums[STATISTICS_GROUP_SIZE];
@@ -26,6 +31,7 @@ float share_of_flux(VirtualPointLight vpl) {
     return (vpl.flux.r + vpl.flux.g + vpl.flux.b) / (3.0 * total_flux);
 }
 
+// How directly a VPL faces the next STATISTICS_PARTNERS of the sequence: Σ cosθ_i·cosθ_j, and the number of pairs.
 vec2 shine_on_each_other(VirtualPointLight vpl, int index, int count) {
     vec2 result = vec2(0.0);
     for (int k = 1; k <= STATISTICS_PARTNERS; ++k) {
@@ -41,6 +47,7 @@ vec2 shine_on_each_other(VirtualPointLight vpl, int index, int count) {
     return result;
 }
 
+// The sums of one invocation: every STATISTICS_GROUP_SIZE-th VPL.
 Moments moments_of(int lane, int count) {
     Moments result = Moments(vec4(0.0), vec3(0.0), vec3(0.0), vec3(0.0), vec4(0.0));
     for (int i = lane; i < count; i += STATISTICS_GROUP_SIZE) {
@@ -59,10 +66,12 @@ Moments moments_of(int lane, int count) {
     return result;
 }
 
+// `part` / `whole` in [0, 1]; 0 where there is nothing.
 float ratio(float part, float whole) {
     return whole > 0.0 ? clamp(part / whole, 0.0, 1.0) : 0.0;
 }
 
+// From sums to ratios. Each formula stands beside its name in renderer/config/scene_statistics.py.
 void write_ratios(Moments moments) {
     ReceiverSums receivers = NO_RECEIVERS;
     for (int i = 0; i < STATISTICS_GROUPS; ++i) { receivers = added(receivers, receiver_sums[i]); }
@@ -78,6 +87,7 @@ void write_ratios(Moments moments) {
 
     float flux = max(moments.position_flux.w, 1e-30);
     vec3 mean = moments.position_flux.xyz / flux;
+    // The covariance of the lit positions: c on the diagonal, o off it (xy, xz, yz).
     vec3 c = max(moments.squares / flux - mean * mean, 0.0);
     vec3 o = moments.products / flux - mean.xxy * mean.yzz;
     float trace = c.x + c.y + c.z;

@@ -1,4 +1,8 @@
-// VPL cells, part 2: each VPL takes the light of its cell, and stands in its middle. One workgroup for each VPL.
+// Clustered disc lights, part 2 of a Lloyd iteration: each VPL takes the light of its samples and moves to their
+// centroid.
+//
+// Reads: samples, their owners, the scene length. Writes: VPLs. One workgroup for each VPL.
+// Python: renderer/frame/passes/clustered_discs.py. Source: see common/clustered_discs.glsl.
 #include "common/scene_length.glsl"
 
 const float PI = 3.14159265358979;
@@ -13,10 +17,11 @@ layout(std430, binding = VIRTUAL_POINT_LIGHTS_BINDING) buffer VirtualPointLights
 
 uniform int sample_count;
 
-shared CellSums sums[64];
+shared ClusterSums sums[64];
 shared float distances[64];
 shared int nearest_samples[64];
 
+// Add up `sums` over the workgroup, into sums[0].
 void sum_lanes(int lane) {
     for (int reach = 32; reach > 0; reach /= 2) {
         barrier();
@@ -27,14 +32,14 @@ void sum_lanes(int lane) {
     barrier();
 }
 
-// The sample that is nearest to the middle; among equals the first.
+// The sample of the VPL's cluster that is nearest to the centroid; the first of equally near ones; -1 without any.
 int sample_nearest_to(int vpl_index, int lane, vec3 middle, vec3 normal) {
     float nearest = 1e30;
     int found = -1;
     for (int i = lane; i < sample_count; i += 64) {
         if (vpl_owners[i] == vpl_index) {
             VirtualPointLight one = vpl_samples[i];
-            float away = cell_distance(
+            float away = cluster_distance(
                 one.position_footprint.xyz - middle, one.normal_area.xyz, normal, scene_length * scene_length);
             if (away < nearest) {
                 nearest = away;
@@ -63,7 +68,7 @@ void main() {
     int vpl_index = int(gl_WorkGroupID.x);
     int lane = int(gl_LocalInvocationIndex);
     vec3 before = virtual_point_lights[vpl_index].position_footprint.xyz;
-    CellSums own = NO_SAMPLES;
+    ClusterSums own = NO_SAMPLES;
     for (int i = lane; i < sample_count; i += 64) {
         if (vpl_owners[i] == vpl_index) {
             own = with_sample(own, vpl_samples[i], before);
@@ -71,8 +76,8 @@ void main() {
     }
     sums[lane] = own;
     sum_lanes(lane);
-    int middle = sample_nearest_to(vpl_index, lane, before + cell_offset(sums[0]), cell_normal(sums[0]));
+    int middle = sample_nearest_to(vpl_index, lane, before + cluster_offset(sums[0]), cluster_normal(sums[0]));
     if (lane == 0) {
-        virtual_point_lights[vpl_index] = middle >= 0 ? cell_vpl(sums[0], before, vpl_samples[middle]) : NO_VPL;
+        virtual_point_lights[vpl_index] = middle >= 0 ? clustered_disc(sums[0], before, vpl_samples[middle]) : NO_VPL;
     }
 }

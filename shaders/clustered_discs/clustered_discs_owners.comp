@@ -1,4 +1,7 @@
-// VPL cells, part 1: the VPL that is nearest to each sample.
+// Clustered disc lights, part 1 of a Lloyd iteration: finds the nearest VPL of each sample.
+//
+// Reads: samples, VPLs, the scene length. Writes: owners, -1 for a dark sample. One invocation for each sample.
+// Python: renderer/frame/passes/clustered_discs.py. Source: see common/clustered_discs.glsl.
 #include "common/scene_length.glsl"
 
 const float PI = 3.14159265358979;
@@ -14,6 +17,7 @@ layout(std430, binding = VIRTUAL_POINT_LIGHTS_BINDING) readonly buffer VirtualPo
 uniform int vpl_count;
 uniform int sample_count;
 
+// A batch of VPLs: position, area (0 where dark); normal.
 shared vec4 positions_lit[64];
 shared vec3 normals[64];
 
@@ -34,7 +38,7 @@ void main() {
         int count = min(64, vpl_count - start);
         for (int i = 0; i < count; ++i) {
             vec3 between = own.position_footprint.xyz - positions_lit[i].xyz;
-            float away = cell_distance(between, own.normal_area.xyz, normals[i], length_squared);
+            float away = cluster_distance(between, own.normal_area.xyz, normals[i], length_squared);
             if (away < nearest && positions_lit[i].w > 0.0) {
                 nearest = away;
                 owner = start + i;

@@ -1,53 +1,64 @@
-// Cells of light around VPLs: samples of the RSM, each of which belongs to the VPL that is nearest to it.
+// Clustered disc lights: RSM samples grouped by their nearest VPL; each group becomes one VPL that shines as a disc.
+//
+// Provides: `cluster_distance`, `ClusterSums` and what is computed from them, and `clustered_disc`. Needs PI.
+// Constants: NORMAL_REACH [L] of renderer/frame/disc_samples.py.
+// Python: renderer/frame/passes/clustered_discs.py. A numpy version: `relaxed` in examples/standalone_vpls.py.
+// Source: Lloyd 1982 for the iterations; Dong et al. 2009 ("Interactive indirect illumination using clustered
+// visibility") make virtual area lights from RSMs this way.
 #include "common/virtual_point_lights.glsl"
 
-// How far apart two surface elements are [L²]: opposite ones count 2 · NORMAL_REACH apart on top of their distance,
-// so that a cell does not go round a corner, where light leaves in another direction.
-float cell_distance(vec3 between, vec3 normal, vec3 other_normal, float length_squared) {
+// Squared distance between two surface elements in units of L². Their normals count too: opposite normals add
+// (2 · NORMAL_REACH)². This keeps a cluster on one side of an edge, where all its light leaves in similar directions.
+float cluster_distance(vec3 between, vec3 normal, vec3 other_normal, float length_squared) {
     return dot(between, between) / length_squared
          + 2.0 * NORMAL_REACH * NORMAL_REACH * (1.0 - dot(normal, other_normal));
 }
 
-// What the samples of a cell add up to.
-struct CellSums {
-    vec4 offset_count;   // offset: from where the VPL was, near to which nothing is rounded off
-    vec4 normal_square;  // squares: of the offset, and half of the sample's own disc's
-    vec4 flux;
+// Sums over the samples of one cluster. Offsets are relative to the VPL's previous position: they are short, so float32
+// sums lose few digits.
+struct ClusterSums {
+    vec4 offset_count;   // Σ offset [world units]; number of samples
+    vec4 normal_square;  // Σ unit normal; Σ (|offset|² + l²/2) [world units²], l²/2 being the spread of a sample's disc
+    vec4 flux;           // Σ flux [W]
 };
 
-const CellSums NO_SAMPLES = CellSums(vec4(0.0), vec4(0.0), vec4(0.0));
+// An empty cluster: the neutral element of `joined`.
+const ClusterSums NO_SAMPLES = ClusterSums(vec4(0.0), vec4(0.0), vec4(0.0));
 
-CellSums joined(CellSums one, CellSums other) {
-    return CellSums(
+ClusterSums joined(ClusterSums one, ClusterSums other) {
+    return ClusterSums(
         one.offset_count + other.offset_count, one.normal_square + other.normal_square, one.flux + other.flux);
 }
 
-CellSums with_sample(CellSums sums, VirtualPointLight one, vec3 before) {
+// `sums` with one more sample; `before` is the VPL's previous position.
+ClusterSums with_sample(ClusterSums sums, VirtualPointLight one, vec3 before) {
     vec3 offset = one.position_footprint.xyz - before;
     float footprint = one.position_footprint.w;
     float square = dot(offset, offset) + 0.5 * footprint * footprint;
-    return joined(sums, CellSums(vec4(offset, 1.0), vec4(one.normal_area.xyz, square), one.flux));
+    return joined(sums, ClusterSums(vec4(offset, 1.0), vec4(one.normal_area.xyz, square), one.flux));
 }
 
-// Where the middle is, from where the VPL was.
-vec3 cell_offset(CellSums sums) {
+// The cluster's centroid, relative to the VPL's previous position.
+vec3 cluster_offset(ClusterSums sums) {
     return sums.offset_count.xyz / max(sums.offset_count.w, 1.0);
 }
 
-vec3 cell_normal(CellSums sums) {
-    // Normals that cancel leave the distance to decide.
+// The cluster's mean direction.
+vec3 cluster_normal(ClusterSums sums) {
+    // Where normals cancel, the result is near 0 and only positions count in `cluster_distance`.
     return sums.normal_square.xyz / max(length(sums.normal_square.xyz), 1e-30);
 }
 
-// The VPL in the middle of a cell, of which `one` is the sample nearest to there.
-VirtualPointLight cell_vpl(CellSums sums, vec3 before, VirtualPointLight one) {
-    vec3 offset = cell_offset(sums);
-    // To the middle itself over the plane of the sample next to it, but within that sample's disc: the middle of
-    // what surrounds a box lies in the box.
+// The clustered disc light: it has the flux of its samples and the radius of their spread. It lies on the surface of
+// `one`, the sample nearest to the centroid.
+VirtualPointLight clustered_disc(ClusterSums sums, vec3 before, VirtualPointLight one) {
+    vec3 offset = cluster_offset(sums);
+    // Slide along the plane of that sample towards the centroid, but stay within the sample's disc: the centroid of
+    // samples all round a box lies inside the box.
     vec3 slide = before + offset - one.position_footprint.xyz;
     slide -= one.normal_area.xyz * dot(one.normal_area.xyz, slide);
     slide *= min(1.0, one.position_footprint.w / max(length(slide), 1e-30));
-    // A disc has a spread of half its radius squared.
+    // The mean squared distance from the centroid; that of an even disc is half its radius squared.
     float spread = max(sums.normal_square.w / sums.offset_count.w - dot(offset, offset), 0.0);
     return VirtualPointLight(
         vec4(one.position_footprint.xyz + slide, sqrt(2.0 * spread)),

@@ -1,4 +1,9 @@
-// Small direct lights without shadows. Twin: renderer/scene/dynamic_lights.py.
+// Dynamic lights: many small point and spot lights, direct light only, without shadows.
+//
+// Provides: `dynamic_lights` and `dynamic_light_irradiance`.
+// Constants: MIN_DISTANCE [ranges] of renderer/scene/dynamic_lights.py; nearer than this a light grows no brighter.
+// Python: renderer/scene/dynamic_lights.py (layout and meaning), renderer/frame/light_pre_pass.py (upload).
+// Source: KHR_lights_punctual, "Range Property" and "Inner and Outer Cone Angles".
 
 struct DynamicLight {
     vec4 position_range;        // world position; range [world units]
@@ -10,11 +15,11 @@ layout(std430, binding = DYNAMIC_LIGHTS_BINDING) readonly buffer DynamicLights {
     DynamicLight dynamic_lights[];
 };
 
-// Irradiance [W/m²] of one light. Range window and cone: KHR_lights_punctual.
+// Irradiance [W/m²] of one light: I · cosθ · cone · (1 - (d/range)⁴) / d².
 vec3 dynamic_light_irradiance(DynamicLight light, vec3 position_world, vec3 normal_world) {
     vec3 to_light = light.position_range.xyz - position_world;
     float range = light.position_range.w;
-    float ratio = dot(to_light, to_light) / (range * range);
+    float ratio = dot(to_light, to_light) / (range * range);  // (d/range)²
     if (ratio >= 1.0) {
         return vec3(0.0);
     }

@@ -1,4 +1,6 @@
-// Reading the G-buffer back: row 0 of the textures is the bottom of the image.
+// Reads the G-buffer: the surface that the camera sees at a pixel. Row 0 of the textures is the bottom of the image.
+//
+// Provides: `gbuffer_receiver`. Python: `GBuffer` in renderer/gpu/render_targets.py, renderer/gpu/camera_uniforms.py.
 #include "common/octahedral.glsl"
 
 uniform sampler2D gbuffer_depth;
@@ -8,12 +10,14 @@ uniform mat4 camera_to_world;
 uniform vec2 tan_half_fov;
 uniform float near_plane;
 
+// A surface point that receives light.
 struct Receiver {
-    bool valid;  // false where the ray left the scene
+    bool valid;  // false where the pixel shows no surface
     vec3 position_world;
-    vec3 normal_world;
+    vec3 normal_world;  // shading normal, unit
 };
 
+// The surface at a pixel. Stored depth is near_plane / distance along the view axis, and 0 where nothing was drawn.
 Receiver gbuffer_receiver(ivec2 pixel) {
     Receiver receiver;
     float depth = texelFetch(gbuffer_depth, pixel, 0).r;

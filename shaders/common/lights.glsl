@@ -1,5 +1,10 @@
-// Punctual lights and the faces of their reflective shadow maps (RSM).
+// Punctual lights (spot, point, directional) and the faces of their reflective shadow maps (RSM).
+//
+// Provides: PI, `lights`, `rsm_faces`, and the light that arrives at a point without shadow.
+// Constants: LIGHT_COUNT and RSM_FACE_COUNT, in the web page only (renderer/export/web_page/web_page.py).
+// Python: renderer/scene/light_faces.py, which also owns the byte layout of both structs.
 
+// Kinds of light: KIND_CODES of renderer/scene/light_faces.py.
 #define LIGHT_SPOT 0
 #define LIGHT_POINT 1
 #define LIGHT_DIRECTIONAL 2
@@ -7,26 +12,26 @@
 const float PI = 3.14159265358979;
 
 struct Light {
-    vec4 position_kind;         // world position, kind
+    vec4 position_kind;         // world position (not used by directional lights); kind
     vec4 direction_cone_scale;  // unit direction of travel; spot: 1 / (cos inner - cos outer)
-    vec4 intensity_cos_outer; // W/sr (directional: W/m² across the beam); spot: cos outer
-    ivec4 faces;                // first face, number of faces
+    vec4 intensity_cos_outer;   // W/sr (directional: W/m² on a surface square to the beam); spot: cos outer
+    ivec4 faces;                // first face, number of faces; the rest is unused
 };
 
-// One view of a light, a tile of the atlas. A perspective face covers |xy| <= extent at unit depth; an
-// orthographic one covers |xy| <= extent in world units and depths in [0, range].
+// One view of a light, drawn into one tile of the RSM atlas. A perspective face covers |xy| <= extent at unit depth. An
+// orthographic face covers |xy| <= extent in world units and depths in [0, range].
 struct RsmFace {
-    mat4 light_to_world;  // rigid; looks along -Z
+    mat4 light_to_world;  // rigid; the face looks along -Z
     vec2 extent;
     float near_or_range;  // perspective: near plane; orthographic: range
-    int light;
-    int orthographic;
+    int light;            // index of its light
+    int orthographic;     // 1 or 0
 #ifndef LIGHT_COUNT
     int padding[3];
 #endif
 };
 
-#ifdef LIGHT_COUNT  // WebGL has no storage buffers; std140 pads a face to the same 96 bytes
+#ifdef LIGHT_COUNT  // WebGL has no storage buffers: uniform blocks. std140 pads a face to the same 96 bytes.
 layout(std140) uniform Lights {
     Light lights[LIGHT_COUNT];
 };
@@ -44,7 +49,7 @@ layout(std430, binding = RSM_FACES_BINDING) readonly buffer RsmFaces {
 };
 #endif
 
-// KHR_lights_punctual, "Inner and Outer Cone Angles".
+// The spot's cone in [0, 1], 1 for other kinds (KHR_lights_punctual, "Inner and Outer Cone Angles").
 float cone_falloff(Light light, vec3 direction_from_light) {
     if (int(light.position_kind.w) != LIGHT_SPOT) {
         return 1.0;
@@ -62,7 +67,7 @@ vec3 towards_light(Light light, vec3 position_world) {
     return normalize(light.position_kind.xyz - position_world);
 }
 
-// Irradiance [W/m²] on a surface square to the light, without shadow.
+// Irradiance [W/m²] on a surface that faces the light, without shadow.
 vec3 irradiance_facing(Light light, vec3 position_world) {
     if (int(light.position_kind.w) == LIGHT_DIRECTIONAL) {
         return light.intensity_cos_outer.rgb;
@@ -73,6 +78,7 @@ vec3 irradiance_facing(Light light, vec3 position_world) {
          / distance_squared;
 }
 
+// A world position in the face's own space.
 vec3 world_to_face(RsmFace face, vec3 position_world) {
     return transpose(mat3(face.light_to_world)) * (position_world - face.light_to_world[3].xyz);
 }

@@ -1,8 +1,12 @@
-// The area of a surface that one pixel of the G-buffer stands for. Needs common/gbuffer.glsl.
+// The surface area that one pixel of the G-buffer covers.
+//
+// Provides: `pixel_area`. Needs common/gbuffer.glsl.
 
-const float MIN_EYE_COSINE = 0.02; // bounds it at grazing sight: 50 times the pixel's own
+// A choice. It bounds the area at grazing angles: at most 50 times what a surface that faces the eye would have.
+const float MIN_EYE_COSINE = 0.02;
 
-// a·z²/(n·v): a is the pixel's area at unit depth, v the ray of unit depth.
+// Area [world units²] = a·z²/(n·v): a is the pixel's area at unit depth, z the depth, n the normal, v the ray of unit
+// depth from the surface to the eye.
 float pixel_area(Receiver surface, ivec2 image_size) {
     vec3 from_eye = surface.position_world - camera_to_world[3].xyz;
     float view_depth = -dot(camera_to_world[2].xyz, from_eye);

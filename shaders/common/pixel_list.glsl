@@ -1,11 +1,16 @@
-// Pixels that are to be drawn once more, and the workgroups of 64 that an indirect dispatch needs for them.
+// A list of pixels for another pass, and the indirect dispatch of workgroups of 64 that processes it.
+//
+// Provides: `append_pixel` for the pass that fills the list, `listed_pixel` for the pass that reads it.
+// Constants: MOST_WORKGROUPS, workgroups along one side of a dispatch (renderer/gpu/shader_library.py).
+// Python: `PixelList` in renderer/gpu/render_targets.py, which empties it.
 
 layout(std430, binding = PIXEL_LIST_BINDING) buffer PixelList {
-    uint pixel_list_groups[3];  // of an indirect dispatch: in rows of at most MOST_WORKGROUPS; the last is 1
+    uint pixel_list_groups[3];  // indirect dispatch: x, at most MOST_WORKGROUPS; y; 1
     uint pixel_list_count;
     uint pixel_list[];          // x | y << 16
 };
 
+// Add a pixel. Every 64th one adds a workgroup.
 void append_pixel(ivec2 pixel) {
     uint index = atomicAdd(pixel_list_count, 1u);
     if (index % 64u == 0u) {
@@ -16,7 +21,7 @@ void append_pixel(ivec2 pixel) {
     pixel_list[index] = uint(pixel.x) | uint(pixel.y) << 16;
 }
 
-// The listed pixel of a workgroup's lane, or (-1, -1) past the end of the list.
+// The pixel for lane `lane` of workgroup `group`; (-1, -1) past the end of the list.
 ivec2 listed_pixel(uvec2 group, uint lane) {
     uint index = (group.y * uint(MOST_WORKGROUPS) + group.x) * 64u + lane;
     if (index >= pixel_list_count) {

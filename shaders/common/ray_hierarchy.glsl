@@ -1,10 +1,16 @@
-// Rays against the scene as it stands: two levels of boxes, instances above triangles. Every surface is
-// two-sided. No length is absolute: a caller moves the origin off the surface that it starts from.
+// Ray tracing in compute shaders: the nearest triangle along a ray, through two levels of bounding boxes, a tree over
+// instances above one tree for each mesh.
+//
+// Provides: `ray_hit`, `ray_hit_normal`. Every surface is two-sided. There is no self-intersection offset in here: the
+// caller moves the origin off the surface that the ray starts from.
+// Constants: RAY_COUNT_BITS (renderer/gpu/bounding_volumes.py), RAY_STACK_SIZE (renderer/gpu/ray_hierarchy.py).
+// Python: renderer/gpu/ray_hierarchy.py. Test against every triangle in float64: tests/support/traced_rays.py.
 
 #include "common/ray_intersection.glsl"
 
-// Nodes stand in pairs, the two children of one parent. `child`: the number of items in a leaf in the low
-// RAY_COUNT_BITS, above them the first item; for an inner node 0, above it the first node of its own pair.
+// A box and what it holds. Nodes stand in pairs, the two children of one parent. The low RAY_COUNT_BITS of `child` hold
+// the number of items of a leaf, and the bits above hold its first item. For an inner node the number is 0 and the bits
+// above hold the first node of its pair of children.
 struct RayNode {
     vec3 low;
     uint child;
@@ -14,7 +20,7 @@ struct RayNode {
 
 struct RayInstance {
     mat3x4 world_to_instance;  // columns are the rows of the affine matrix
-    uvec4 root;                // as `child` of a node; the rest is unused
+    uvec4 root;                // x: root of the mesh's tree, as `child` of a node; the rest is unused
 };
 
 layout(std430, binding = RAY_NODES_BINDING) readonly buffer RayNodes {
@@ -29,21 +35,24 @@ layout(std430, binding = RAY_INSTANCES_BINDING) readonly buffer RayInstances {
     RayInstance ray_instances[];
 };
 
+// The bits of `child` that hold a leaf's number of items.
 const uint RAY_COUNT_MASK = (1u << RAY_COUNT_BITS) - 1u;
-// Not leaves: more items than any leaf has.
+// Stack entries that are no nodes: the end of the traversal, and the way back to world space. Their low bits give a
+// number of items that no leaf has.
 const uint RAY_DONE = 0xFFFFFFFFu;
 const uint RAY_LEAVE_INSTANCE = 0xFFFFFFFEu;
 
-// The nearest surface on a ray.
+// The nearest surface along a ray.
 struct RayHit {
     float distance;
-    uint triangle;  // RAY_NO_TRIANGLE where nothing is met
+    uint triangle;  // RAY_NO_TRIANGLE where the ray hits nothing
     uint instance;
 };
 
+// The largest uint: no scene has that many triangles.
 const uint RAY_NO_TRIANGLE = 0xFFFFFFFFu;
 
-// What the unit direction meets first; nothing farther than `longest`, which is then the distance.
+// The first hit along a unit direction within `longest`, or RAY_NO_TRIANGLE at distance `longest`.
 RayHit ray_hit(vec3 origin_world, vec3 direction_world, float longest) {
     uint stack[RAY_STACK_SIZE];
     int height = 1;
@@ -53,7 +62,7 @@ RayHit ray_hit(vec3 origin_world, vec3 direction_world, float longest) {
     bool in_instance = false;
     uint instance = 0u;
     RayHit hit = RayHit(longest, RAY_NO_TRIANGLE, 0u);
-    uint current = 0u;
+    uint current = 0u;  // the pair at 0: the root of the tree over instances
     while (true) {
         while ((current & RAY_COUNT_MASK) == 0u) {
             uint pair = current >> RAY_COUNT_BITS;
@@ -63,6 +72,7 @@ RayHit ray_hit(vec3 origin_world, vec3 direction_world, float longest) {
             float to_right = box_distance(ray, right.low, right.high, nearest);
             bool right_first = to_right < to_left;
             current = right_first ? right.child : left.child;
+            // Written in any case, and kept only if the ray meets both boxes.
             stack[height] = right_first ? left.child : right.child;
             height += int(max(to_left, to_right) < RAY_MISS);
             if (min(to_left, to_right) >= RAY_MISS) {
@@ -100,12 +110,12 @@ RayHit ray_hit(vec3 origin_world, vec3 direction_world, float longest) {
     return hit;
 }
 
-// Unit normal in the world of the triangle that was met, towards the ray's origin.
+// Unit normal of the triangle that was hit, in the world, on the side of the ray's origin.
 vec3 ray_hit_normal(RayHit hit, vec3 direction_world) {
     RayTriangle triangle = ray_triangles[hit.triangle];
     vec3 across = cross(triangle.b - triangle.a, triangle.c - triangle.a);
-    // Normals go by the inverse transpose of what positions go by. Scaled first: tiny triangles have tiny
-    // cross products.
+    // Normals transform by the inverse transpose of the matrix for positions. The division keeps the cross product of a
+    // tiny triangle within float32.
     vec3 size = abs(across);
     across /= max(max(size.x, size.y), max(size.z, 1e-30));
     vec3 normal = normalize((ray_instances[hit.instance].world_to_instance * across).xyz);

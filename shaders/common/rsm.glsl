@@ -1,4 +1,10 @@
-// Reading the RSM atlas: square tiles, one per light face, filled column by column, row by row.
+// Reads the reflective shadow map (RSM). The atlas holds one square tile for each light face, column by column and row
+// by row.
+//
+// Provides: `rsm_texel`, `rsm_position_on_plane`, `mean_flux`. Texture depth is reversed, 0 where nothing was drawn.
+// Constants: RSM_RESOLUTION, texels along the side of a tile.
+// Python: `ReflectiveShadowMap` in renderer/gpu/render_targets.py. A numpy version of `rsm_texel`:
+// renderer/techniques/vpls_readback.py. Source: Dachsbacher and Stamminger 2005.
 #include "common/lights.glsl"
 #include "common/octahedral.glsl"
 
@@ -8,23 +14,29 @@ uniform sampler2D rsm_reflectance;
 uniform int rsm_columns;
 uniform int rsm_face_count;
 
+// The piece of surface that a light sees in one texel.
 struct RsmTexel {
-    vec3 flux;            // radiant flux reflected by the surface in this texel [W]; 0 where unlit
+    vec3 flux;            // radiant flux that it reflects [W]; 0 where unlit
     vec3 position_world;
-    vec3 normal_world;    // geometric, on the lit side
-    float area;           // of the surface in this texel [world units²]
+    vec3 normal_world;    // geometric normal on the lit side, unit
+    float area;           // area on the surface [world units²]
 };
 
-const float RSM_MIN_COSINE = 0.02; // bounds the area that one texel stands for at grazing incidence: 50 times its own
+// A choice. It bounds the area of a texel at grazing incidence: at most 50 times what a facing surface would have.
+const float RSM_MIN_COSINE = 0.02;
 
+// The lowest texel of a face's tile.
 ivec2 rsm_tile_origin(int face_index) {
     return ivec2(face_index % rsm_columns, face_index / rsm_columns) * RSM_RESOLUTION;
 }
 
+// Distance along the face's axis [world units] from the stored, reversed depth.
 float rsm_view_depth(RsmFace face, float depth) {
     return face.orthographic != 0 ? (1.0 - depth) * face.near_or_range : face.near_or_range / depth;
 }
 
+// The surface in a texel of the atlas. Flux = intensity · solid angle · reflectance, or for a directional light
+// irradiance · area across the beam · reflectance.
 RsmTexel rsm_texel(ivec2 texel) {
     RsmTexel result = RsmTexel(vec3(0.0), vec3(0.0), vec3(0.0, 0.0, 1.0), 0.0);
     ivec2 tile = texel / RSM_RESOLUTION;
@@ -39,7 +51,7 @@ RsmTexel rsm_texel(ivec2 texel) {
     vec2 side = face.extent * (2.0 / float(RSM_RESOLUTION));
     float view_depth = rsm_view_depth(face, depth);
 
-    float flux_factor; // solid angle, or area across the beam
+    float flux_factor;  // solid angle of the texel [sr], or its area across the beam [world units²]
     vec3 position_face;
     vec3 to_light;
     if (face.orthographic != 0) {
@@ -63,8 +75,8 @@ RsmTexel rsm_texel(ivec2 texel) {
     return result;
 }
 
-// Where the light's ray through a place of the atlas, counted in texels, meets the plane of the surface that
-// is seen in a texel beside it; the texel's own place where ray and plane are all but parallel.
+// Where the light's ray through `place`, a point of the atlas in texels, meets the plane of the surface in `texel`; the
+// texel's own position where ray and plane are nearly parallel.
 vec3 rsm_position_on_plane(RsmTexel texel, vec2 place) {
     ivec2 tile = ivec2(place) / RSM_RESOLUTION;
     RsmFace face = rsm_faces[tile.y * rsm_columns + tile.x];
@@ -85,7 +97,7 @@ vec3 rsm_position_on_plane(RsmTexel texel, vec2 place) {
     return start + ray * (dot(texel.normal_world, texel.position_world - start) / along);
 }
 
-// Flux as one number: the mean of the channels, since error counts the same in each of them.
+// Flux as one number: the mean of the channels, because the error measure weighs all channels alike.
 float mean_flux(vec3 flux) {
     return (flux.r + flux.g + flux.b) / 3.0;
 }

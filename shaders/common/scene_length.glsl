@@ -1,4 +1,5 @@
-// What the runtime measures of the light in the scene, every frame, on the GPU.
+// The frame statistics: what the GPU measures of the light in every frame, and among it the scene length L.
+// Written by virtual_point_lights/vpl_marginal_density.comp. Python: renderer/frame/passes/virtual_point_lights.py.
 
 layout(std430, binding = FRAME_STATISTICS_BINDING) buffer FrameStatistics {
     float total_weight;   // sum over RSM texels of the sampling weight (common/vpl_importance.glsl)

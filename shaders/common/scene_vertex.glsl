@@ -1,4 +1,7 @@
-// The scene's vertices and where they stand in the world: what geometry and RSM passes have in common.
+// The scene's vertices in world space, with skinning: shared by the geometry pass and the RSM pass.
+//
+// Provides: `scene_vertex`. Vertex inputs: in_position, in_normal, in_uv, in_color, in_instance.
+// Python: renderer/gpu/scene_buffers.py, which owns the byte layout.
 
 in vec3 in_position;
 in vec3 in_normal;
@@ -8,16 +11,16 @@ in int in_instance;
 
 struct SceneInstance {
     mat4 to_world;
-    mat4 normal_to_world;  // cofactors of to_world's linear part; the last row and column are unused
+    mat4 normal_to_world;  // cofactors of to_world's linear part, scaled; the last row and column are unused
     vec4 base_color;
-    ivec4 skinning;  // first influence, first vertex, influences per vertex (0: no skin), first joint
+    ivec4 skinning;        // first influence, first vertex, influences per vertex (0: no skin), first joint
 };
 
 layout(std430, binding = SCENE_INSTANCES_BINDING) readonly buffer SceneInstances {
     SceneInstance scene_instances[];
 };
 
-// How much one vertex follows one joint.
+// The weight with which one vertex follows one joint.
 struct SkinInfluence {
     int joint;
     float weight;
@@ -28,7 +31,7 @@ layout(std430, binding = SKIN_INFLUENCES_BINDING) readonly buffer SkinInfluences
 };
 
 layout(std430, binding = JOINT_MATRICES_BINDING) readonly buffer JointMatrices {
-    mat4 joint_matrices[];  // from the mesh as it was bound to the world
+    mat4 joint_matrices[];  // from the bind pose of the mesh to the world
 };
 
 struct SceneVertex {
@@ -37,7 +40,7 @@ struct SceneVertex {
     vec3 base_color;
 };
 
-// Linear blend skinning: the weighted sum of the joints' matrices.
+// Linear blend skinning: the weighted sum of the matrices of the vertex's joints.
 mat4 blended_joints(ivec4 skinning) {
     int first = skinning.x + (gl_VertexID - skinning.y) * skinning.z;
     mat4 blended = mat4(0.0);
@@ -47,11 +50,12 @@ mat4 blended_joints(ivec4 skinning) {
     return blended;
 }
 
-// Cofactors: what carries normals, for mirrored matrices too.
+// The cofactor matrix: transforms normals, also where `linear` mirrors.
 mat3 normal_matrix(mat3 linear) {
     return mat3(cross(linear[1], linear[2]), cross(linear[2], linear[0]), cross(linear[0], linear[1]));
 }
 
+// The vertex that this invocation draws.
 SceneVertex scene_vertex() {
     SceneInstance instance = scene_instances[in_instance];
     mat4 to_world = instance.to_world;
@@ -64,7 +68,7 @@ SceneVertex scene_vertex() {
     vertex.position_world = (to_world * vec4(in_position, 1.0)).xyz;
     vertex.normal_world = normal_to_world * in_normal;
     if (instance.skinning.z > 0) {
-        // Each vertex has a matrix of its own: their sizes must not weigh in the interpolation.
+        // Each vertex has its own matrix, whose scale must not act as a weight when normals are interpolated.
         float length_squared = dot(vertex.normal_world, vertex.normal_world);
         vertex.normal_world *= length_squared > 0.0 ? inversesqrt(length_squared) : 1.0;
     }

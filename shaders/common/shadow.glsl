@@ -1,10 +1,13 @@
-// Shadows of the punctual lights, from their RSMs. Needs common/gbuffer.glsl and common/rsm.glsl.
+// Shadows of the punctual lights, looked up in their RSMs.
+//
+// Provides: `shadow`. Needs common/gbuffer.glsl and common/rsm.glsl.
 
-// Shadow bias in RSM texels, so that it holds at every scale and resolution: the receiver is moved off its
-// surface by NORMAL_BIAS texels, and a blocker must stand DEPTH_BIAS texels in front of it.
+// Choices. The bias is in RSM texels, so it does not depend on scale or resolution. The receiver moves along its normal
+// by NORMAL_BIAS texels times the sine of the angle of incidence; a blocker must lie DEPTH_BIAS texels in front of it.
 const float NORMAL_BIAS = 1.5;
 const float DEPTH_BIAS = 0.5;
 
+// The light's face that looks towards a position most directly.
 int face_towards(Light light, vec3 position_world) {
     int best = light.faces.x;
     float best_depth = -1.0;
@@ -15,7 +18,8 @@ int face_towards(Light light, vec3 position_world) {
     return best;
 }
 
-// Share of the light that arrives: percentage-closer filtering (Reeves et al. 1987) of the four nearest texels.
+// Share of the light that arrives, in [0, 1]: percentage-closer filtering (Reeves et al. 1987) over the four nearest
+// texels.
 float shadow(Light light, Receiver receiver, vec3 to_light) {
     int face_index = face_towards(light, receiver.position_world);
     RsmFace face = rsm_faces[face_index];

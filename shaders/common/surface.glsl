@@ -1,4 +1,7 @@
-// The surface under a fragment: albedo and the two normals.
+// The surface under a fragment: albedo, geometric normal and shading normal.
+//
+// Provides: `surface_albedo`, `geometric_normal`, `shading_normal`.
+// Reads: the outputs of geometry.vert, reflective_shadow_map.vert or web/scene.vert, and the base colour texture.
 
 in vec3 position_world;
 in vec3 normal_world;
@@ -8,6 +11,7 @@ in vec3 base_color;
 uniform sampler2D base_color_texture;
 uniform ivec2 mirrored;  // 1 where the texture repeats mirrored, which OpenGL samplers of moderngl lack
 
+// Albedo in [0, 1]: base colour times texture. Gradients come from `uv` before mirroring, which has a crease.
 vec3 surface_albedo() {
     vec2 dx = dFdx(uv);
     vec2 dy = dFdy(uv);
@@ -16,16 +20,16 @@ vec3 surface_albedo() {
     return clamp(base_color * textureGrad(base_color_texture, lookup, dx, dy).rgb, 0.0, 1.0);
 }
 
-// The plane of the triangle, turned towards `eye_world`.
+// Unit normal of the triangle, turned towards the viewer (the camera or the light).
 vec3 geometric_normal(vec3 to_eye) {
     vec3 normal = cross(dFdx(position_world), dFdy(position_world));
-    // Slivers have no area in a pixel quad: face the eye, the neighbourhood of which they are seen from.
+    // The derivatives of a sliver may be parallel. Then the normal is the direction to the viewer.
     float length_squared = dot(normal, normal);
     normal = length_squared > 0.0 ? normal * inversesqrt(length_squared) : normalize(to_eye);
     return dot(normal, to_eye) < 0.0 ? -normal : normal;
 }
 
-// The interpolated normal, turned towards `eye_world` (every surface is two-sided).
+// Unit interpolated normal, turned towards the viewer, since every surface is two-sided.
 vec3 shading_normal(vec3 to_eye, vec3 normal_geometric) {
     float length_squared = dot(normal_world, normal_world);
     if (!(length_squared > 0.0)) {

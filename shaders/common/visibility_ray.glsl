@@ -1,4 +1,6 @@
-// The surface that a VPL sees along an axis of its hemisphere.
+// One ray of a VPL's visibility map: the surface that the VPL sees in one direction of its hemisphere.
+//
+// Provides: `cast_visibility_texel`. Python: renderer/frame/passes/vpl_visibility_maps.py.
 #include "common/scene_length.glsl"
 #include "common/virtual_point_lights.glsl"
 #include "common/ray_hierarchy.glsl"
@@ -10,6 +12,7 @@ layout(std430, binding = VIRTUAL_POINT_LIGHTS_BINDING) readonly buffer VirtualPo
 
 uniform float longest;  // the scene's diagonal [world units]
 
+// The map entry for one ray from a VPL; `axis` is its unit direction in the VPL's frame. A VPL without flux casts none.
 uvec2 cast_visibility_texel(VirtualPointLight vpl, vec3 axis) {
     mat3 frame = hemisphere_frame(vpl.normal_area.xyz);
     vec3 direction = frame * axis;

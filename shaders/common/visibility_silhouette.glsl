@@ -1,16 +1,21 @@
-// Whether a silhouette runs through a visibility map's texel: what it met would shade what a neighbour met, or the
-// other way round. One ray says too little there; a corner of a room, or an edge of a box that the VPL looks at,
-// hides nothing. Reads entries by SILHOUETTE_ENTRY(texel).
+// Silhouettes in a visibility map. One runs through a texel if the surface that its ray hit shades the surface that a
+// neighbour's ray hit, or the other way round. There, one ray says too little. The corner of a room, or the edge of a
+// box that faces the VPL, hides nothing and is no silhouette.
+//
+// Provides: `is_silhouette`. The including file defines SILHOUETTE_ENTRY(texel), which reads a map's entry.
 #include "common/vpl_visibility.glsl"
 
-// Overlap beyond which one surface hides another, of the distance: some times the bias of a lookup.
+// A choice: the overlap beyond which one surface hides another, as a share of the distance. It is four times the
+// default of visibility_bias.
 const float LEAST_OVERLAP = 2e-3;
 
-// `farthest` [L]: what was met lies nearer; nothing lies farther, and is never hidden, since no receiver is there.
+// Whether the surface `nearer` shades the surface `farther`. Rays that hit something end within `farthest` [L]. A ray
+// that hit nothing ends beyond it and is never hidden, because no receiver is there.
 bool hides(MetSurface nearer, MetSurface farther, float farthest) {
     return length(farther.end) < farthest && surface_overlap(nearer, farther.end, farther.normal) > LEAST_OVERLAP;
 }
 
+// Whether a texel and any of its eight neighbours hide one another.
 bool is_silhouette(ivec2 texel, float farthest) {
     MetSurface own = met_surface(SILHOUETTE_ENTRY(texel), texel, VISIBILITY_MAP_SIZE);
     ivec2 last = min(texel + 1, ivec2(VISIBILITY_MAP_SIZE - 1));

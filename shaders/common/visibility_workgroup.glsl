@@ -1,8 +1,9 @@
-// Which VPL's map a workgroup makes: rows of workgroups, since one side of a dispatch may be too short for all.
+// Which VPL's visibility map a workgroup works on. The dispatch is two-dimensional, because one side of it may be
+// limited to fewer workgroups than there are VPLs.
 
 uniform int vpl_count;
 
-// May be vpl_count and more in the last row.
+// The index of the workgroup's VPL. In the last row it may be vpl_count or more: then there is nothing to do.
 int workgroup_vpl() {
     return int(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x);
 }

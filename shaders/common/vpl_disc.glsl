@@ -1,20 +1,25 @@
-// A cell of light as a disc of even radiosity, cut off at the receiver's horizon. Twin: tuner/surrogate/vpl_disc.py.
+// Irradiance from a clustered disc light: a disc of even radiosity, cut off at the receiver's horizon.
 //
-// Of a disc around c with normal m, radius l and flux Φ, a receiver at x with normal n gets, with the height
-// h = m·(x - c) > 0, ρ = (x - c) - h m, S = |x - c|² + l² and Q = √(S² - 4ρ²l²),
-//     E = 2Φ/(πQ) · [ -m·n h²/(Q + S - 2l²) - ρ·n h/(Q + S) ],
-// which is -m·n and -ρ·n/ρ times the form factors of an element parallel and at right angles to a disc (Howell, Siegel
-// and Mengüç 2010), and Φ cosθ_x cosθ_m/(πd²) from afar. It holds while all of the disc is over the receiver's
-// horizon. Else the part that is (Baum et al. 1989 clip polygons so) shines as a disc of its area at its centroid.
+// Provides: `disc_vector_irradiance`. Needs PI, common/virtual_point_lights.glsl and common/vpl_irradiance.glsl.
+// Constants: DISC_LEAST_PART, DISC_LEAST_RADIUS and DISC_FADE_HEIGHT of renderer/frame/vpl_disc_bounds.py.
+// Twin: tuner/surrogate/vpl_disc.py. A short version: examples/standalone_disc.glsl.
+//
+// The disc has centre c, normal m, radius l and flux Φ. A receiver at x, with normal n, is h = m·(x - c) > 0 above its
+// plane. With ρ = (x - c) - h m, S = |x - c|² + l² and Q = √(S² - 4ρ²l²), the irradiance is
+//     E = 2Φ/(πQ) · [ -m·n h²/(Q + S - 2l²) - ρ·n h/(Q + S) ].
+// The two terms are -m·n and -ρ·n/ρ times the form factors from a surface element to a disc parallel to it and to one
+// at right angles to it (Howell, Siegel and Mengüç 2010). From afar, E becomes Φ cosθ_x cosθ_m/(πd²).
+// This holds while the whole disc is above the receiver's horizon. Otherwise the part above the horizon is taken as a
+// disc of its own area around its own centroid. (Baum et al. 1989 clip polygons at the horizon.)
 
-// Of a unit disc, the part on the far side of a chord that passes its middle at distance t on the near side:
-// x, its share of the area; y, how far its centroid is from the middle.
+// A chord cuts a unit disc. `t` is the centre's signed distance from the chord, positive where the centre is on the
+// kept side. Returns x, the kept part's share of the area, and y, the distance of its centroid from the centre.
 vec2 disc_past_chord(float t) {
-    // Less than 1, where the roots' derivatives are not finite.
+    // Kept below 1, where the derivatives of the square roots are infinite. 1e-6 is a choice.
     float a = min(abs(t), 1.0 - 1e-6);
     float root = sqrt(1.0 - a);
     float half_chord = root * sqrt(1.0 + a);
-    // arccos a (Abramowitz and Stegun 1964, 4.4.45).
+    // arccos a by the polynomial of Abramowitz and Stegun 1964, 4.4.45.
     float angle = root * (1.5707288 + a * (-0.2121144 + a * (0.0742610 - a * 0.0187293)));
     float lesser = max(angle - a * half_chord, 0.0) / PI;
     float share = t > 0.0 ? 1.0 - lesser : lesser;
@@ -22,12 +27,12 @@ vec2 disc_past_chord(float t) {
     return vec2(share, moment / max(share, DISC_LEAST_PART));
 }
 
-// Vector irradiance, in units of Φ/π: times the receiver's normal, irradiance where that is positive. Lengths are
-// in units of L.
+// Vector irradiance in units of Φ/π: its dot product with the receiver's normal is the irradiance, where positive.
+// Lengths are in units of L.
 vec3 disc_vector(vec3 to_vpl, vec3 normal, vec3 vpl_normal, float radius) {
     float height = -dot(vpl_normal, to_vpl);
     float between = dot(normal, vpl_normal);
-    // Sine of the angle between both planes; its bound keeps parallel ones from dividing by 0.
+    // Sine of the angle between the two planes. The bound avoids a division by 0 for parallel planes.
     float slope = sqrt(max(1.0 - between * between, 1e-12));
     vec2 part = disc_past_chord(dot(normal, to_vpl) / (slope * radius));
     float fade = min(2.0 * height / DISC_FADE_HEIGHT - 1.0, 1.0);
@@ -37,7 +42,8 @@ vec3 disc_vector(vec3 to_vpl, vec3 normal, vec3 vpl_normal, float radius) {
     vec3 to_part = to_vpl + (normal - between * vpl_normal) * (part.y * radius / slope);
     float radius_squared = radius * radius * part.x;
     float distance_squared = dot(to_part, to_part);
-    // Q + S - 2l² is Q + excess. Where the excess is negative, it is 4h²l²/(Q - excess), which does not cancel.
+    // Q + S - 2l² = Q + excess. For a negative excess it is computed as 4h²l²/(Q - excess), where no digits cancel.
+    // 1e-36, a length in L to the fourth power, keeps Q above 0.
     float excess = distance_squared - radius_squared;
     float q = sqrt(max(excess * excess + 4.0 * height * height * radius_squared, 1e-36));
     float larger = q + abs(excess);
@@ -46,7 +52,8 @@ vec3 disc_vector(vec3 to_vpl, vec3 normal, vec3 vpl_normal, float radius) {
     return ((to_part + height * vpl_normal) * lateral - vpl_normal * axial) * (2.0 * fade * part.x / q);
 }
 
-// As `disc_vector`, of one watt of the VPL's flux. `vpl_falloff` is its counterpart for points.
+// Vector irradiance [1/world units²] of one watt of the VPL's flux. The counterpart for points is
+// `vpl_falloff` in common/vpl_irradiance.glsl.
 vec3 disc_vector_irradiance(
     vec3 to_vpl, vec3 normal, VirtualPointLight vpl, float scene_length, FalloffParameters parameters
 ) {

@@ -1,4 +1,8 @@
-// What importance is measured between: cells of the RSM, and a few hundred surface points that the camera sees.
+// The quantities that importance is computed from: importance cells of the RSM (squares of texels), and the receivers,
+// surface points that the camera sees.
+//
+// Provides: the structs, `cell_form`, `disc_irradiance`, `receiver_weight`. Needs PI.
+// Constants: IMPORTANCE_SPREAD of renderer/frame/passes/vpl_importance.py. Used by the runtime and the web page.
 
 struct ImportanceCell {
     vec4 position_flux;  // flux-weighted mean position; mean flux of a texel [W], 0 where nothing is lit
@@ -6,15 +10,16 @@ struct ImportanceCell {
 };
 
 struct ImportanceReceiver {
-    vec4 position_valid;
-    vec4 normal_irradiance;  // estimate from all cells, without visibility, in an arbitrary unit
+    vec4 position_valid;     // world position; 1 where the camera sees a surface, else 0
+    vec4 normal_irradiance;  // unit normal; irradiance from all cells without visibility, in an arbitrary unit
 };
 
-// Below it, one surface is in the other's plane, and rounding says on which side. Cells that a receiver got a crumb
-// from would count in the mean importance, which went up and down with them.
+// A choice. Below this cosine, one surface lies in the plane of the other, and rounding decides on which side. Without
+// the bound, such cells would come and go in the mean importance.
 const float LEAST_COSINE = 1e-3;
 
-// Irradiance at a receiver for each watt of the cell, the light spread over the cell's own disc.
+// Irradiance at a receiver for each watt of the cell. The light is spread over IMPORTANCE_SPREAD times the cell's area
+// and so stays finite close to the cell.
 float cell_form(vec3 position_world, vec3 normal_world, ImportanceCell cell) {
     vec3 to_cell = cell.position_flux.xyz - position_world;
     float distance_squared = max(dot(to_cell, to_cell), 1e-30);
@@ -23,11 +28,13 @@ float cell_form(vec3 position_world, vec3 normal_world, ImportanceCell cell) {
     return cosines / distance_squared / (PI * distance_squared + IMPORTANCE_SPREAD * cell.normal_area.w);
 }
 
+// Irradiance at a receiver from a cell; 0 from a dark cell.
 float disc_irradiance(vec3 position_world, vec3 normal_world, ImportanceCell cell) {
     return cell.position_flux.w > 0.0 ? cell.position_flux.w * cell_form(position_world, normal_world, cell) : 0.0;
 }
 
-// How much an error at a receiver counts; `dark` is the irradiance squared below which it no longer counts for more.
+// The weight of an error at a receiver, up to a constant factor: 1 / (E² + dark). `dark` is a squared irradiance, below
+// which receivers hardly count for more.
 float receiver_weight(ImportanceReceiver receiver, float dark) {
     float irradiance = receiver.normal_irradiance.w;
     return dark > 0.0 ? receiver.position_valid.w / (irradiance * irradiance / dark + 1.0) : 0.0;

@@ -1,8 +1,11 @@
-// VPLs from points of a table, by inverting the running sums of the sampling weights. Needs common/rsm.glsl and
-// common/virtual_point_lights.glsl, and of whoever includes it: `sum_in_row(row, column)` and `sum_of_rows(row)`, the
-// sums up to and with a column or row; `sampling_weight(texel, flux)`, `total_weight`, `vpl_count` and `rows`.
+// Places VPLs: inverts the running sums of the sampling weights at the points of a table (inverse transform sampling).
+//
+// Provides: `placed_vpl`. Needs common/rsm.glsl and common/virtual_point_lights.glsl. The including file defines
+// `sum_in_row(row, column)` and `sum_of_rows(row)`, the sums up to and including a column or row, and
+// `sampling_weight(texel, flux)`, `total_weight`, `vpl_count` and `rows`.
+// Constants: RSM_RESOLUTION, RSM_FILTERING (renderer/frame/runtime_options.py).
 
-// First index whose running sum exceeds `target`.
+// The first row whose running sum exceeds `target`.
 int row_above(float target) {
     int low = 0;
     int high = rows - 1;
@@ -13,6 +16,7 @@ int row_above(float target) {
     return low;
 }
 
+// The first column, up to `last`, of a row whose running sum exceeds `target`.
 int column_above(int row, int last, float target) {
     int low = 0;
     int high = last;
@@ -23,13 +27,14 @@ int column_above(int row, int last, float target) {
     return low;
 }
 
-// A VPL at a texel, with flux and area of the RSM_FILTERING² texels around it, of its face, in the mean: so that
-// it has the colour of its surroundings, not that of a speckle which the light's next move replaces. Weighted by
-// the chance of each, sum(flux) / sum(weight) keeps the energy: among texels of one chance it is the plain mean.
+// A VPL at a texel, with the mean flux and area of the RSM_FILTERING² texels around it, within its face. It then has
+// the colour of its surroundings and not of one texel, which would flicker as the light moves. The mean is
+// sum(flux) / sum(weight), which conserves energy; for texels of equal probability it is the plain mean.
+// `within` is the position inside the texel, in [0, 1]².
 VirtualPointLight texel_vpl(ivec2 texel, vec2 within) {
     RsmTexel surface = rsm_texel(texel);
     if (!(mean_flux(surface.flux) > 0.0)) {
-        return NO_VPL; // rounding of the sums may find a dark texel beside a lit one
+        return NO_VPL;  // rounding in the sums may select a dark texel beside a lit one
     }
     const int reach = RSM_FILTERING / 2;
     ivec2 tile_low = texel / RSM_RESOLUTION * RSM_RESOLUTION;
@@ -49,19 +54,19 @@ VirtualPointLight texel_vpl(ivec2 texel, vec2 within) {
             }
         }
     }
-    // N · p, with p = weight / total_weight the chance of all these texels in one draw.
+    // N · p, the expected number of VPLs in these texels: p = weight / total_weight is their probability in one draw.
     float draws = float(vpl_count) * weight / total_weight;
     area /= draws;
 #if RSM_FILTERING > 1
-    // What the inversion leaves over of the table's point is the place in the texel: as light or density shift,
-    // a VPL slides where it would jump from centre to centre.
+    // The rest of the table's point after the inversion gives the position inside the texel. As the light moves or the
+    // density changes, the VPL slides over the surface and does not jump between texel centres.
     surface.position_world = rsm_position_on_plane(surface, vec2(texel) + within);
 #endif
     return VirtualPointLight(
         vec4(surface.position_world, sqrt(area / PI)), vec4(surface.normal_world, area), vec4(flux / draws, 0.0));
 }
 
-// The VPL at a point of the table, in [0, 1)².
+// The VPL for a point of the table in [0, 1)²: inverts the marginal over rows, then the conditional along the row.
 VirtualPointLight placed_vpl(vec2 point) {
     if (!(total_weight > 0.0)) {
         return NO_VPL;
@@ -74,7 +79,7 @@ VirtualPointLight placed_vpl(vec2 point) {
     int column = column_above(row, last, target.x);
     vec2 low = vec2(column > 0 ? sum_in_row(row, column - 1) : 0.0, row > 0 ? sum_of_rows(row - 1) : 0.0);
     vec2 high = vec2(sum_in_row(row, column), sum_of_rows(row));
-    // The maximum guards the quotient where rounding finds a texel of no weight.
+    // 1e-30 guards the quotient where rounding selects a texel without weight.
     vec2 within = clamp((target - low) / max(high - low, vec2(1e-30)), 0.0, 1.0);
     return texel_vpl(ivec2(column, row), within);
 }

@@ -1,12 +1,17 @@
-// What a VPL sees, from its small map of surfaces. Twin: tuner/surrogate/vpl_visibility.py.
+// Visibility of a VPL from its visibility map: a small hemispherical map of the surfaces that the VPL sees.
+//
+// Provides: reading and writing of a map's entries, and `vpl_visibility`. Needs common/virtual_point_lights.glsl.
+// Constants: VISIBILITY_MAP_SIZE, VISIBILITY_MAP_REFINEMENT, VISIBILITY_LIFT [footprints] and VISIBILITY_LEAST_LIFT [L]
+// of renderer/frame/visibility_map_layout.py.
+// Twin: tuner/surrogate/vpl_visibility.py. Imperfect shadow maps (Ritschel et al. 2008) hold the same, but as depths.
 #include "common/hemi_octahedral.glsl"
 #include "common/octahedral.glsl"
 
-// visibility_maps [vpls, size, size]: what a ray along the texel's axis meets, as its distance [L] in bits of a
-// float, and its normal towards the VPL in the VPL's frame, octahedral in 2 × 16 bits. With the sign bit set, a
-// silhouette runs through the texel, and the second word is the place of its block in
-// visibility_details [blocks, refinement, refinement], which are such texels of a map so much finer.
-#ifndef VISIBILITY_MAP_ENTRY  // WebGL has no storage buffers, and brings its own
+// visibility_maps [vpls, size, size] holds one entry for each ray: the distance to the surface that it hit [L], as the
+// bits of a float, and that surface's normal on the VPL's side, in the VPL's frame, octahedral in 2 × 16 bits. If the
+// sign bit of the first word is set, a silhouette runs through the texel. Then the second word is the index of a block
+// in visibility_details [blocks, refinement, refinement], which holds entries of the same form for finer rays.
+#ifndef VISIBILITY_MAP_ENTRY  // WebGL has no storage buffers: web/visibility_atlas.glsl defines its own
 layout(std430, binding = VISIBILITY_MAPS_BINDING) buffer VisibilityMaps {
     uvec2 visibility_maps[];
 };
@@ -18,47 +23,53 @@ layout(std430, binding = VISIBILITY_DETAILS_BINDING) buffer VisibilityDetails {
     visibility_details[(int(block) * VISIBILITY_MAP_REFINEMENT + inside.y) * VISIBILITY_MAP_REFINEMENT + inside.x]
 #endif
 
+// The sign bit of a float: distances are never negative.
 const uint VISIBILITY_BLOCK_BIT = 0x80000000u;
-// What meets nothing ends so many diagonals of the scene away, at a wall that faces the VPL: no receiver is behind it.
+// A choice: a ray that hits nothing is stored as a wall that faces the VPL, this many diagonals of the scene away. Any
+// number above 1 lies behind every receiver.
 const float VISIBILITY_NOTHING = 2.0;
-// What meets something ends nearer than so many.
+// A choice between 1, the longest hit in diagonals, and VISIBILITY_NOTHING: tells hits from misses.
 const float VISIBILITY_FARTHEST = 1.5;
 
-// What a VPL sees, in its frame.
+// The surface that a ray of the map hit, in the VPL's frame.
 struct MetSurface {
-    vec3 end;  // from the map's origin [L]
-    vec3 normal;
+    vec3 end;     // the hit, relative to the map's origin [L]
+    vec3 normal;  // unit, on the VPL's side
 };
 
 struct VisibilityParameters {
-    float bias;      // of the distance: how far two surfaces may overlap before one shades the other
-    float softness;  // of the distance, over which light then fades out
+    float bias;      // β: the overlap, as a share of the distance, up to which a surface does not shade
+    float softness;  // σ: the overlap beyond it over which the light fades out, as a share of the distance
 };
 
-// Where rays start, and distances count from.
+// The map's origin, lifted off the VPL's surface: rays start there, and distances are measured from there.
 vec3 visibility_origin(VirtualPointLight vpl, float scene_length) {
     float lift = max(VISIBILITY_LIFT * vpl.position_footprint.w, VISIBILITY_LEAST_LIFT * scene_length);
     return vpl.position_footprint.xyz + vpl.normal_area.xyz * lift;
 }
 
+// The unit direction of a texel's ray, in the VPL's frame.
 vec3 visibility_axis(ivec2 texel, int size) {
     return hemi_octahedral_decode((vec2(texel) + 0.5) * (2.0 / float(size)) - 1.0);
 }
 
+// The entry for a ray's hit.
 uvec2 visibility_texel(float distance_in_l, vec3 normal_vpl) {
     return uvec2(floatBitsToUint(distance_in_l), packUnorm2x16(octahedral_encode(normal_vpl)));
 }
 
+// The entry that points to a block of finer rays.
 uvec2 visibility_block(uint block) {
     return uvec2(VISIBILITY_BLOCK_BIT, block);
 }
 
+// The hit that an entry holds; `size` is the number of texels along the side of the entry's map.
 MetSurface met_surface(uvec2 entry, ivec2 texel, int size) {
     return MetSurface(
         visibility_axis(texel, size) * uintBitsToFloat(entry.x), octahedral_decode(unpackUnorm2x16(entry.y)));
 }
 
-// What the ray nearest to a direction (in the VPL's frame, not unit) met.
+// The hit of the ray nearest to a direction of any length, in the VPL's frame. `map_start` is the map's first entry.
 MetSurface seen_surface(vec3 direction, int map_start) {
     vec2 place = (hemi_octahedral_encode(direction) * 0.5 + 0.5) * float(VISIBILITY_MAP_SIZE);
     ivec2 texel = min(ivec2(place), ivec2(VISIBILITY_MAP_SIZE - 1));
@@ -76,27 +87,27 @@ MetSurface seen_surface(vec3 direction, int map_start) {
     return met_surface(entry, texel, size);
 }
 
-// By how much, of its distance, a surface overlaps a receiver: it stands so far before the receiver's tangent
-// plane, and the receiver so far behind its own; the lesser of the two. The first is receiver plane depth bias
-// (Isidoro 2006); with the second, surfaces of one convex room or one convex body never shade each other, however
-// coarse the map, and a wall may be as thin as it likes. Positions from the map's origin [L], in the VPL's frame.
+// The overlap of a surface and a receiver, as a share of the receiver's distance. It is the lesser of two heights: of
+// the surface in front of the receiver's tangent plane, and of the receiver behind the surface's own plane. The first
+// is receiver plane depth bias (Isidoro 2006). With the second, surfaces of one convex room or convex body never shade
+// each other, however coarse the map, and walls may be as thin as they like. Positions are relative to the map's origin
+// [L], in the VPL's frame.
 float surface_overlap(MetSurface met, vec3 receiver, vec3 receiver_normal) {
     vec3 between = met.end - receiver;
     return min(dot(between, receiver_normal), dot(between, met.normal)) * inversesqrt(dot(receiver, receiver));
 }
 
-// Share of a VPL's light that reaches a receiver, past the surface that the ray nearest to its direction met. No
-// blend of neighbouring texels: many VPLs blend by themselves, and for the price of four lookups finer maps are
-// better.
+// Share of a VPL's light that reaches a receiver, in [0, 1], from one lookup. Texels are not interpolated: many VPLs
+// average out, and a finer map is better than four lookups at the same cost.
 float vpl_visibility(
     vec3 position_world, vec3 normal_world, VirtualPointLight vpl, int map_start, float scene_length,
     VisibilityParameters parameters
 ) {
-    // Made anew for each pair: cheaper than nine more numbers from shared memory.
+    // Computed for each pair: cheaper than nine more numbers in shared memory.
     mat3 frame = hemisphere_frame(vpl.normal_area.xyz);
     vec3 to_receiver = (position_world - visibility_origin(vpl, scene_length)) * frame / scene_length;
     vec3 normal = normal_world * frame;
-    // A receiver that is below the horizon, or faces away, gets nothing anyway.
+    // A receiver below the VPL's horizon, or facing away from it, gets no light anyway.
     if (!(to_receiver.z > 0.0) || !(dot(to_receiver, normal) < 0.0)) {
         return 1.0;
     }

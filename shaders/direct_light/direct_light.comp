@@ -1,5 +1,8 @@
-// Direct irradiance at every pixel: what the light pre-pass has summed, and all punctual lights, shadowed by
-// their RSMs.
+// Direct light: irradiance at every pixel from the punctual lights, with shadows from their RSMs, and from the light
+// pre-pass.
+//
+// Reads: G-buffer, lights, RSM depth, light accumulation. Writes: direct irradiance [W/m²], alpha 1 where a surface is.
+// Constants: RSM_RESOLUTION. Python: renderer/frame/passes/direct_light.py.
 #include "common/gbuffer.glsl"
 #include "common/rsm.glsl"
 #include "common/shadow.glsl"
@@ -20,7 +23,7 @@ void main() {
     Receiver receiver = gbuffer_receiver(pixel);
     vec3 irradiance = vec3(0.0);
     if (receiver.valid && accumulation_unit > 0.0) {
-        // The largest half float: a sum beyond it was stored as infinity.
+        // 65504 is the largest half float: a larger sum was stored as infinity.
         irradiance = accumulation_unit * min(texelFetch(light_accumulation, pixel, 0).rgb, 65504.0);
     }
     if (receiver.valid) {

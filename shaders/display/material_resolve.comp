@@ -1,4 +1,7 @@
-// Radiance towards the eye: albedo / π times what arrives, direct and indirect.
+// Material resolve: radiance towards the eye, L = albedo/π · E, for diffuse surfaces.
+//
+// Reads: albedo, direct and indirect irradiance. Writes: radiance [W/(m² sr)], alpha 1 where a surface is.
+// Python: renderer/frame/passes/material_resolve.py. Twin: tuner/metrics/radiance.py.
 layout(local_size_x = 8, local_size_y = 8) in;
 
 uniform sampler2D gbuffer_albedo;

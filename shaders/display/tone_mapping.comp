@@ -1,4 +1,7 @@
-// Exposure, tone curve and sRGB encoding: from scene radiance to what a display shows.
+// Tone mapping: exposure, tone curve and sRGB encoding, from radiance to the 8-bit display image.
+//
+// Reads: radiance, exposure. Writes: the display image. Python: renderer/frame/passes/tone_mapping.py.
+// Twins: tuner/metrics/tone_curve.py, tuner/report/templates/scene.js.
 layout(local_size_x = 8, local_size_y = 8) in;
 
 uniform sampler2D radiance;

@@ -1,4 +1,7 @@
-// Irradiance of one light at one pixel, blended over all lights.
+// Light volumes: irradiance of one dynamic light at one pixel, blended additively over all lights.
+//
+// Reads: G-buffer, dynamic lights. Writes: light accumulation, in units of `accumulation_unit` [W/m²].
+// Python: renderer/frame/passes/light_volumes.py.
 #include "common/dynamic_lights.glsl"
 #include "common/gbuffer.glsl"
 

@@ -1,8 +1,12 @@
-// Light volumes: one instance of a proxy mesh for each light, just large enough to hold its reach.
+// Light volumes: one instance of a proxy mesh for each dynamic light, just large enough to enclose what it reaches.
+//
+// Reads: dynamic lights. Output: `light_index`.
+// Constants: CONE (1 for spots), AZIMUTH_COSINE and CIRCUMSCRIBED of renderer/frame/passes/light_volumes.py.
+// Python: renderer/frame/passes/light_volumes.py. Source: Engel 2008 ("Light Pre-Pass").
 #include "common/dynamic_lights.glsl"
 
-// Points: a direction times the circumscribing radius. Spots: share of the polar angle (-1: the apex), and the
-// cosine and sine of the azimuth.
+// Point lights: a direction times the radius of the circumscribed mesh, in ranges. Spots (CONE): share of the polar
+// angle, or -1 at the apex; cosine and sine of the azimuth.
 in vec3 in_position;
 
 uniform int first_light;
@@ -13,7 +17,8 @@ uniform float near_plane;
 flat out int light_index;
 
 #if CONE
-// Two unit vectors square to a third (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
+// Columns: two unit vectors at right angles to the unit vector n, and n (Duff et al. 2017, "Building an Orthonormal
+// Basis, Revisited").
 mat3 basis_around(vec3 n) {
     float s = n.z >= 0.0 ? 1.0 : -1.0;
     float a = -1.0 / (s + n.z);
@@ -23,7 +28,7 @@ mat3 basis_around(vec3 n) {
 
 vec3 proxy_vertex(DynamicLight light) {
     float cos_outer = max(light.intensity_cos_outer.w, 0.0);
-    // The pyramid of the outermost ring holds the cone: its edges lean out, so that its faces touch.
+    // The outermost ring makes a pyramid around the cone: its edges lie further out, so that its faces touch the cone.
     float angle = atan(sqrt(1.0 - cos_outer * cos_outer), cos_outer * AZIMUTH_COSINE);
     float polar = max(in_position.x, 0.0) * angle;
     float reach = in_position.x < 0.0 ? 0.0 : CIRCUMSCRIBED;

@@ -1,6 +1,11 @@
-// Tiled lights: each tile picks its lights from its cell's, a batch at a time, and shades with them.
-// A batch is a set of bits in shared memory: no list can overflow, and the order of summation is always that of
-// the lights, so that a frame drawn twice is the same to the last bit.
+// Tiled lights, part 3: each tile selects its lights from those of its light-culling cell, a batch at a time, and adds
+// up their irradiance.
+//
+// Reads: G-buffer, dynamic lights, tiles, cells. Writes: light accumulation, in units of `accumulation_unit` [W/m²].
+// A batch is a set of bits in shared memory. So no list can overflow, and lights are always summed in the same order,
+// which makes frames repeat bitwise.
+// Constants: TILE_SIZE [pixels], CELL_TILES and TILE_BATCH of renderer/frame/passes/tiled_lights.py.
+// Python: renderer/frame/passes/tiled_lights.py. Source: Andersson 2009; Harada 2012.
 #include "common/light_culling.glsl"
 
 layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
@@ -10,19 +15,22 @@ layout(rgba16f, binding = ACCUMULATION_IMAGE) writeonly uniform image2D out_accu
 uniform int cell_columns;
 uniform float accumulation_unit;
 
-// Lights that one lane tests: enough lanes for a thousand lights, few steps for a hundred thousand.
+// A choice: the number of lights that one lane tests at a time. It keeps many lanes busy for 1,000 lights and needs few
+// steps for 100,000. LANE_MASK has as many bits.
 const int LANE_LIGHTS = 8;
 const uint LANE_MASK = 0xffu;
-const int WORDS = TILE_BATCH / 32;
+const int WORDS = TILE_BATCH / 32;  // 32 lights in a word
 shared uint words[WORDS];
-shared uint filled_words[WORDS / 32]; // which of the words have any bit
+shared uint filled_words[WORDS / 32];  // one bit for each word that is not 0
 
+// One bit for each depth slice of the tile between two depths.
 uint slices_between(float near_depth, float far_depth, LightTile tile) {
     uint first = depth_slice(near_depth, tile.nearest, tile.farthest);
     uint last = depth_slice(far_depth, tile.nearest, tile.farthest);
     return (0xffffffffu << first) & (0xffffffffu >> (31u - last));
 }
 
+// Whether a light may reach an occupied depth slice of the tile.
 bool light_reaches_tile(DynamicLight light, ViewBlock block, LightTile tile) {
     if (!light_reaches(light, block)) {
         return false;

@@ -1,11 +1,15 @@
-// Lights against cells of CELL_TILES x CELL_TILES tiles: the first of two levels.
+// Tiled lights, part 2: lights against light-culling cells of CELL_TILES x CELL_TILES tiles.
+//
+// Reads: tiles, dynamic lights. Writes: for each cell, one bit for each light that may reach it.
+// One workgroup for each cell and each batch of CULL_BATCH lights.
+// Constants: TILE_SIZE, CELL_TILES, GROUP_SIZE and CULL_BATCH of renderer/frame/passes/tiled_lights.py.
 #include "common/light_culling.glsl"
 
 layout(local_size_x = GROUP_SIZE) in;
 
 uniform ivec2 tile_count;
 
-shared uint nearest_bits;
+shared uint nearest_bits;  // positive floats have the order of their bits
 shared uint farthest_bits;
 shared uint words[CULL_BATCH / 32];
 
@@ -14,7 +18,7 @@ void main() {
     ivec2 first_tile = ivec2(gl_WorkGroupID.xy) * CELL_TILES;
     ivec2 end_tile = min(first_tile + CELL_TILES, tile_count);
     if (lane == 0) {
-        nearest_bits = 0x7f7fffffu;
+        nearest_bits = 0x7f7fffffu;  // the largest float32
         farthest_bits = 0u;
     }
     if (lane < CULL_BATCH / 32) {

@@ -1,16 +1,19 @@
-// Depths seen in each tile: their range, and which slices of it are occupied (Harada 2012, "2.5D culling").
+// Tiled lights, part 1: the range of depths in each tile, and which slices of that range hold a surface.
+//
+// Reads: G-buffer depth. Writes: tiles. One workgroup for each tile.
+// Constants: TILE_SIZE of renderer/frame/passes/tiled_lights.py. Source: Harada 2012 ("2.5D culling").
 #include "common/light_culling.glsl"
 
 layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
 
-shared uint nearest_bits; // positive floats are ordered as their bits are
+shared uint nearest_bits;  // positive floats have the order of their bits
 shared uint farthest_bits;
 shared uint slices;
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (gl_LocalInvocationIndex == 0) {
-        nearest_bits = 0x7f7fffffu;
+        nearest_bits = 0x7f7fffffu;  // the largest float32
         farthest_bits = 0u;
         slices = 0u;
     }

@@ -1,4 +1,6 @@
-// G-buffer: shading normal (octahedral) and albedo; position comes back from depth.
+// Geometry pass: writes the G-buffer's shading normal (octahedral) and albedo. Positions are rebuilt from depth.
+//
+// Reads: the outputs of geometry.vert, the base colour texture. Python: renderer/frame/passes/geometry.py.
 #include "common/octahedral.glsl"
 #include "common/surface.glsl"
 

@@ -1,4 +1,7 @@
-// G-buffer: the camera's view of the scene.
+// Geometry pass: the scene from the camera.
+//
+// Reads: the scene's vertices and instances. Output: position, normal, uv and base colour in world space.
+// Python: renderer/frame/passes/geometry.py.
 #include "common/scene_vertex.glsl"
 
 uniform mat4 world_to_camera;
@@ -17,6 +20,6 @@ void main() {
     base_color = vertex.base_color;
     uv = in_uv;
     vec3 position_camera = (world_to_camera * vec4(position_world, 1.0)).xyz;
-    // Reversed depth without a far plane: depth = near / distance along the axis.
+    // Reversed depth without a far plane: depth = near_plane / distance along the view axis.
     gl_Position = vec4(position_camera.xy / tan_half_fov, near_plane, -position_camera.z);
 }

@@ -1,4 +1,8 @@
-// Reflective shadow map (Dachsbacher and Stamminger 2005): the light's view of the scene, one face.
+// Reflective shadow map: the scene from one light face. Depth is reversed: 1 at the near plane, 0 at infinity or, for
+// an orthographic face, at its range.
+//
+// Reads: the scene's vertices and instances, light faces. Output: position, normal, uv and base colour in world space.
+// Python: renderer/frame/passes/reflective_shadow_map.py. Source: Dachsbacher and Stamminger 2005.
 #include "common/scene_vertex.glsl"
 #include "common/lights.glsl"
 

@@ -1,13 +1,18 @@
-// What every pixel gives to its neighbourhood: its radiosity from direct light, and the squared footprint that
-// a VPL has which is drawn on its surface.
+// Screen-space indirect, part 1: for every pixel, its radiosity from direct light and the squared footprint that a VPL
+// drawn on its surface has.
 //
-// A draw takes RSM texel i, of area A_i and reflected flux Φ_i, with chance p_i = Φ_i^γ F_i / W, W = Σ Φ_i^γ F_i,
-// F_i the factor of its importance. Its VPL stands for the area A = A_i / (N p_i) = A_i W / (N Φ_i^γ F_i). Where the
-// radiosity is B, Φ_i = B A_i, so
+// Reads: G-buffer, direct irradiance, light accumulation, lights, frame statistics, importance factors.
+// Writes: emitters. Dynamic lights are subtracted, because they have no VPLs.
+// Python: renderer/frame/passes/screen_space_indirect.py.
+//
+// One draw takes RSM texel i, of area A_i and reflected flux Φ_i, with probability p_i = Φ_i^γ F_i / W, where
+// W = Σ Φ_i^γ F_i and F_i is the importance factor. Its VPL stands for the area
+//     A = A_i / (N p_i) = A_i W / (N Φ_i^γ F_i).
+// For radiosity B, Φ_i = B A_i, and so
 //     A = A_i^(1-γ) W / (N B^γ F_i),    l² = A / π.
-// For γ = 1 the texel's own area drops out: A = Φ_total / (N B) without importance, each VPL the same flux.
-// Where several lights shine on one point, each has VPLs of its own, wider than l: less is then given than
-// was lost, never more.
+// For γ = 1 without importance, all VPLs have the same flux and the texel's area drops out: A = Φ_total / (N B).
+// Where several lights reach a point, each light has its own VPLs there, with footprints wider than this l. The near
+// field then returns less than the VPLs withhold, never more.
 #include "common/artist_parameters.glsl"
 #include "common/gbuffer.glsl"
 #include "common/rsm.glsl"
@@ -26,11 +31,11 @@ uniform int light_count;
 layout(rgba32f, binding = EMITTERS_IMAGE) writeonly uniform image2D out_emitters;  // radiosity [W/m²], l² [world units²]
 
 struct SeeingTexel {
-    float area;        // on the surface
-    float importance;  // factor of its weight
+    float area;        // on the surface [world units²]
+    float importance;  // F
 };
 
-// The RSM texel that sees a surface: of the light that shines on it most, shadows aside.
+// The RSM texel that sees a surface, of the light that gives it the most irradiance without shadows.
 SeeingTexel rsm_texel_seeing(Receiver receiver) {
     float most = 0.0;
     SeeingTexel result = SeeingTexel(0.0, 1.0);
@@ -67,6 +72,7 @@ void main() {
     }
     vec3 irradiance = texelFetch(direct_irradiance, pixel, 0).rgb;
     if (accumulation_unit > 0.0) {
+        // As in direct_light.comp: 65504 is the largest half float.
         vec3 dynamic = accumulation_unit * min(texelFetch(light_accumulation, pixel, 0).rgb, 65504.0);
         irradiance = max(irradiance - dynamic, 0.0);
     }
@@ -78,7 +84,7 @@ void main() {
         if (artist.density_exponent < 1.0 || artist.density_importance > 0.0) {
             SeeingTexel texel = rsm_texel_seeing(gbuffer_receiver(pixel));
             area /= texel.importance;
-            // 0 to the power of 0 is not defined where no light's texel was found.
+            // pow(0, 0) is undefined: where no texel was found, the area is 0.
             area *= artist.density_exponent < 1.0 ? pow(texel.area, 1.0 - artist.density_exponent) : 1.0;
         }
     }

@@ -1,13 +1,19 @@
-// Screen-space indirect: from directly lit pixels nearby, the light that softened VPLs withhold.
+// Screen-space indirect, part 2: the near field, light that softened VPLs withhold close to a surface, gathered from
+// directly lit pixels nearby.
 //
-// A VPL's 1/d² is softened to 1/(d² + (αl)²). Summed over draws, VPLs give the integral of the softened kernel over
-// lit surfaces; what is missing is the same integral with
+// Reads: G-buffer, emitters, mean VPL footprint, frame statistics, artist parameters. Writes: irradiance, interleaved.
+// Constants: BLOCK, SAMPLES and NEAREST_PIXEL of renderer/frame/passes/screen_space_indirect.py; R2_STEP_* of
+// renderer/frame/point_table.py.
+// Python: renderer/frame/passes/screen_space_indirect.py.
+//
+// A VPL's 1/d² is softened to 1/(d² + (αl)²). In the mean over draws, the VPLs integrate the softened kernel over the
+// lit surfaces. What is missing is the same integral with the kernel
 //     1/d² - 1/(d² + (αl)²) = 1/d² · (1 - d²/(d² + (αl)²)),
-// intensity k and transmittance T(d) alike. It falls as 1/d⁴, so that the visible surroundings hold nearly all
-// of it; Nichols and Wyman (2010) and Novák et al. (2011) restore bounded VPL light the same way.
+// and with the same intensity k and transmittance T(d). It falls as 1/d⁴, so the visible neighbourhood holds nearly all
+// of it. Nichols and Wyman (2010) and Novák et al. (2011) restore the light of bounded VPLs in the same way.
 //
-// Samples lie evenly in angle and in the logarithm of the radius, for the integrand falls as 1/r² in a corner.
-// The pixels of a 4×4 block take different runs of one R2 sequence; the interleaved filter puts them together.
+// Samples are even in angle and in the logarithm of the radius, because the integrand falls as 1/r² in a corner. The
+// pixels of a BLOCK² block take consecutive runs of one R2 sequence; the interleaved filter joins them.
 #include "common/artist_parameters.glsl"
 #include "common/gbuffer.glsl"
 #include "common/pixel_area.glsl"
@@ -26,7 +32,7 @@ layout(rgba32f, binding = IRRADIANCE_IMAGE) writeonly uniform image2D out_irradi
 const float PI = 3.14159265358979;
 const vec2 R2_STEP = vec2(R2_STEP_X, R2_STEP_Y);
 
-// Irradiance from the whole of pixel `at`, per pixel area.
+// Irradiance from the surface in pixel `at`.
 vec3 near_field(Receiver receiver, ivec2 at) {
     vec4 emitter = texelFetch(emitters, at, 0);
     Receiver surface = gbuffer_receiver(at);
@@ -41,7 +47,7 @@ vec3 near_field(Receiver receiver, ivec2 at) {
     float area = pixel_area(surface, textureSize(emitters, 0));
     float softening = artist.falloff_footprint * artist.falloff_footprint * emitter.a;
     float lost = softening / (distance_squared + softening);
-    // The pixel itself is a disc, not a point: with its area, no neighbour gives more than its form factor.
+    // The pixel counts as a disc of its own area: so no neighbour gives more than the form factor of a disc.
     float form = cosine_receiver * cosine_emitter / distance_squared / (distance_squared + area / PI);
     float transmittance = exp(-artist.extinction_coefficient * sqrt(distance_squared) / scene_length);
     return emitter.rgb * (area / PI * form * lost * transmittance);
@@ -60,7 +66,7 @@ void main() {
     }
     float view_depth = near_plane / texelFetch(gbuffer_depth, pixel, 0).r;
     float pixel_footprint = 2.0 * tan_half_fov.y * view_depth / float(size.y);
-    // No farther than the image is high: what is beyond would not be seen either.
+    // At most the height of the image: little beyond that is visible.
     float radius = min(artist.screen_space_radius * mean_vpl_footprint / pixel_footprint, float(size.y));
     vec3 irradiance = vec3(0.0);
     if (radius > NEAREST_PIXEL) {

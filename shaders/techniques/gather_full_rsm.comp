@@ -1,4 +1,6 @@
-// A VPL for every block of RSM texels: its middle texel stands for all of the block.
+// One VPL for every block of stride × stride RSM texels: the block's middle texel stands for the whole block.
+//
+// Reads: the RSM. Writes: VPLs. Python: renderer/techniques/gather_full_rsm.py, a technique to compare with.
 #include "common/rsm.glsl"
 #include "common/virtual_point_lights.glsl"
 

@@ -1,4 +1,7 @@
-// Irradiance of one light at every pixel of the image, blended over all draws.
+// Irradiance of one dynamic light at every pixel, blended additively over all draws.
+//
+// Reads: G-buffer, dynamic lights. Writes: light accumulation, in units of `accumulation_unit` [W/m²].
+// Python: renderer/techniques/light_per_draw.py, a technique to compare with.
 #include "common/dynamic_lights.glsl"
 #include "common/gbuffer.glsl"
 

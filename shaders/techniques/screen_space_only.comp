@@ -1,4 +1,9 @@
-// A VPL for every block of pixels: its middle pixel, with the direct light that it reflects.
+// One VPL for every block of stride × stride pixels: the middle pixel stands for the whole block and reflects its
+// direct light.
+//
+// Reads: G-buffer, direct irradiance. Writes: VPLs.
+// Python: renderer/techniques/screen_space_only.py, a technique to compare with.
+// Source: Ritschel, Grosch and Seidel 2009, for indirect light from what the camera sees.
 #include "common/gbuffer.glsl"
 #include "common/pixel_area.glsl"
 #include "common/virtual_point_lights.glsl"

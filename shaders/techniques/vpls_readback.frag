@@ -1,4 +1,7 @@
-// Irradiance of one VPL at every pixel, added to what is there.
+// Irradiance of one VPL at every pixel, blended additively over all draws.
+//
+// Reads: G-buffer, scene length; the VPL comes in uniforms. Writes: irradiance [W/m²].
+// Python: renderer/techniques/vpls_readback.py, a technique to compare with.
 #include "common/gbuffer.glsl"
 #include "common/scene_length.glsl"
 #include "common/virtual_point_lights.glsl"

@@ -1,5 +1,9 @@
-// VPLs: points of the table warped to the density over RSM texels, by inverting first the marginal over
-// rows, then the conditional along the row. No value leaves the GPU.
+// Virtual point lights, part 3: draws VPLs from the density over RSM texels, at the points of a table.
+//
+// Reads: the RSM, the running sums of parts 1 and 2, frame statistics, importance factors, the point table.
+// Writes: VPLs. One invocation for each VPL. Nothing is read back to the CPU.
+// Constants: RSM_RESOLUTION, RSM_FILTERING, IMPORTANCE_CELLS.
+// Python: renderer/frame/passes/virtual_point_lights.py.
 #include "common/artist_parameters.glsl"
 #include "common/rsm.glsl"
 #include "common/vpl_importance.glsl"
@@ -23,7 +27,7 @@ layout(std430, binding = VIRTUAL_POINT_LIGHTS_BINDING) writeonly buffer VirtualP
 
 uniform int vpl_count;
 uniform int rows;
-uniform vec2 table_rotation;  // Cranley and Patterson (1976)
+uniform vec2 table_rotation;  // shifts the table on its torus, in [0, 1)² (Cranley and Patterson 1976)
 
 float sum_in_row(int row, int column) {
     return row_cdf[row * rsm_columns * RSM_RESOLUTION + column];

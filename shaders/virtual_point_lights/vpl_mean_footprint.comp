@@ -1,4 +1,6 @@
-// The mean footprint of the frame's VPLs, as the radius of their mean area. One workgroup.
+// The mean footprint of the frame's VPLs: the radius of a disc of their mean area. One workgroup.
+//
+// Reads: VPLs. Writes: `mean_vpl_footprint` [world units]. Python: renderer/frame/passes/screen_space_indirect.py.
 #include "common/virtual_point_lights.glsl"
 
 layout(local_size_x = 256) in;

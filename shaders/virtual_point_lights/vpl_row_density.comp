@@ -1,5 +1,9 @@
-// VPL density, part 1: for each row of the RSM atlas, the running sum of the sampling weights and the
-// moments of the flux. One workgroup per row.
+// Virtual point lights, part 1: for each row of the RSM atlas, the running sum of the sampling weights and the moments
+// of the flux.
+//
+// Reads: the RSM, importance factors, artist parameters. Writes: `row_cdf`, `row_moments`. One workgroup for each row.
+// Constants: ROW_GROUP_SIZE of renderer/frame/passes/virtual_point_lights.py; RSM_RESOLUTION, IMPORTANCE_CELLS.
+// Python: renderer/frame/passes/virtual_point_lights.py.
 #include "common/artist_parameters.glsl"
 #include "common/rsm.glsl"
 #include "common/vpl_importance.glsl"
@@ -19,7 +23,7 @@ layout(std430, binding = ROW_MOMENTS_BINDING) writeonly buffer RowMomentsBuffer 
     RowMoments row_moments[];
 };
 
-uniform vec3 moment_origin;
+uniform vec3 moment_origin;  // a point near the light, from where sums of squares lose few digits
 
 shared float scan[ROW_GROUP_SIZE];
 shared vec4 sums_flux_position[ROW_GROUP_SIZE];
@@ -31,8 +35,8 @@ void main() {
     int columns = rsm_columns * RSM_RESOLUTION;
     vec4 flux_position = vec4(0.0);
     vec4 rest = vec4(0.0);
-    // Each invocation sums a run of its own, and one scan over the runs' totals says where each begins: barriers
-    // are few, which counts where invocations of a group take turns.
+    // Each invocation sums its own run of columns; then one scan over the runs' totals gives each run its start. This
+    // needs few barriers, which are expensive where the invocations of a workgroup take turns.
     int run = (columns + ROW_GROUP_SIZE - 1) / ROW_GROUP_SIZE;
     int begin = min(lane * run, columns);
     int end = min(begin + run, columns);
@@ -49,7 +53,7 @@ void main() {
         }
         row_cdf[row * columns + column] = total;
     }
-    // Inclusive scan of Hillis and Steele (1986): the order of additions is fixed, so frames repeat bitwise.
+    // Inclusive scan (Hillis and Steele 1986) in a fixed order of additions, so that frames repeat bitwise.
     scan[lane] = total;
     barrier();
     for (int reach = 1; reach < ROW_GROUP_SIZE; reach *= 2) {

@@ -1,12 +1,19 @@
-// Reconstruction of interleaved images: every pixel takes from its neighbours on the same surface what they
-// gathered and left to it (Keller and Heidrich 2001, the discontinuity buffer; Segovia et al. 2006).
+// Interleaved filter: reconstructs an image from interleaved pixels. Each pixel averages what its neighbours on the
+// same surface gathered from their subsets of the VPLs.
 //
-// The window is n + 1 pixels wide, n = INTERLEAVE, its outer pixels counting half, so that it is centred and
-// each of the n² subsets counts once. Pixels on another surface are left out, by plane distance, told in pixel
-// footprints so that no length enters, and by normal. Weights are divided by their sum: a constant stays itself.
-// With RELIGHT, a neighbour's irradiance is turned to the pixel's normal first, by the direction it comes from.
-// Near an edge, part of the subsets is missing; with REFINE, pixels where what is there is too few or too
-// uneven to say what is missing go into the list for a full gather.
+// Reads: G-buffer, the interleaved image; with RELIGHT, the direction of its light; with ADD_BASE, an image to add.
+// Writes: irradiance; with REFINE, the list of pixels that need a full gather.
+// Constants: INTERLEAVE, RELIGHT, REFINE, ADD_BASE; PLANE_TOLERANCE [pixel footprints], NORMAL_COSINE, LEAST_COSINE,
+// LARGEST_RELIGHTING, LEAST_VARIANCE, LEAST_ABSENT and LARGEST_ERROR of renderer/frame/passes/interleaved_filter.py.
+// Python: renderer/frame/passes/interleaved_filter.py.
+// Source: Keller and Heidrich 2001 (the discontinuity buffer); Segovia et al. 2006.
+//
+// The window is n + 1 pixels wide, n = INTERLEAVE. Its outer pixels count half, so it is centred and each of the n²
+// subsets counts once. Pixels on another surface are left out, by normal and by distance from the pixel's plane, in
+// pixel footprints so that no world unit enters. Weights are divided by their sum: a constant image stays constant.
+// With RELIGHT, a neighbour's irradiance is first converted to the pixel's normal, by the direction of its light.
+// Near an edge, some subsets are missing. With REFINE, pixels whose remaining subsets are too few or too uneven go into
+// the list for a full gather.
 #include "common/gbuffer.glsl"
 #include "common/pixel_list.glsl"
 
@@ -18,13 +25,14 @@ uniform sampler2D base;       // with ADD_BASE: added to the result
 
 layout(rgba32f, binding = IRRADIANCE_IMAGE) writeonly uniform image2D out_irradiance;
 
-const int REACH = INTERLEAVE / 2;
-const int TILE = 8 + 2 * REACH;
+const int REACH = INTERLEAVE / 2;  // of the window, in pixels
+const int TILE = 8 + 2 * REACH;    // a workgroup's 8×8 pixels and the window's border
 
-shared vec4 tile_irradiance[TILE * TILE];  // alpha: distance along the camera's axis, 0 without a surface
+shared vec4 tile_irradiance[TILE * TILE];  // alpha: distance along the view axis, 0 without a surface
 shared vec3 tile_normal[TILE * TILE];
-shared vec3 tile_light[TILE * TILE];  // times a normal: irradiance on it, of that on the pixel's own
+shared vec3 tile_light[TILE * TILE];  // dot(this, n): irradiance on normal n over that on the pixel's own normal
 
+// Load a workgroup's pixels and border into shared memory.
 void load_tile(ivec2 size) {
     ivec2 corner = ivec2(gl_WorkGroupID.xy) * 8 - REACH;
     for (int i = int(gl_LocalInvocationIndex); i < TILE * TILE; i += 64) {
@@ -44,15 +52,17 @@ void load_tile(ivec2 size) {
 }
 
 struct Window {
-    vec4 sum;     // irradiance of neighbours on the pixel's surface, weighed, and the sum of weights (at most n²)
-    vec3 around;  // of neighbours on any surface: weighed square, mean channel, and the sum of weights
+    vec4 sum;     // neighbours on the pixel's surface: weighted sum of irradiance; sum of weights, at most n²
+    vec3 around;  // neighbours on any surface: weighted sums of the mean channel squared and of it; sum of weights
 };
 
+// The window around a pixel; `center` is the pixel's index in the tile.
 Window weigh(int center, vec2 ndc, vec2 ndc_step) {
     Window window = Window(vec4(0.0), vec3(0.0));
     vec3 normal = tile_normal[center];
     float depth = tile_irradiance[center].a;
-    // Height over the pixel's plane is depth times what is linear in the image, less the same at the pixel.
+    // The height of a neighbour over the pixel's plane is its depth times a linear function of its position in the
+    // image, minus the same for the pixel.
     vec3 normal_camera = normal * mat3(camera_to_world);
     float slope = dot(normal_camera, vec3(ndc * tan_half_fov, -1.0));
     vec2 slope_step = normal_camera.xy * tan_half_fov * ndc_step;
@@ -78,9 +88,9 @@ Window weigh(int center, vec2 ndc, vec2 ndc_step) {
     return window;
 }
 
-// Whether the subsets that are absent from the window may change its mean too much. A mean of n of N things has
-// the variance σ²/n · (1 - n/N) (Cochran 1977, theorem 2.2). σ² is told from neighbours on any surface: the subset
-// with a VPL close by may be just the one that is absent.
+// Whether the subsets that are absent from the window may change its mean too much. The mean of n of N values has the
+// variance σ²/n · (1 - n/N) (Cochran 1977, theorem 2.2). σ² is estimated from neighbours on any surface, because the
+// absent subset may be the one with a close VPL.
 bool needs_full_gather(Window window) {
     float count = window.sum.a;
     float level = dot(window.sum.rgb, vec3(1.0 / 3.0)) / count;

@@ -1,11 +1,16 @@
-// VPL gather: indirect irradiance at every pixel, VPLs passing through shared memory.
-// Interleaved sampling (Keller and Heidrich 2001): the pixels of an n×n block, n = INTERLEAVE, share the VPLs
-// out among themselves, n² times as bright. A workgroup takes pixels of one place in their blocks, so that all
-// of its pixels read the same VPLs (Segovia et al. 2006, done here by arithmetic on the pixel's index).
-// With it goes the direction that the light comes from, so that the filter can tell what a pixel's share would
-// be on its neighbours' normals.
-// With VPL_DISCS, VPLs shine as discs, and else as points.
-// With LISTED_PIXELS, the pixels are those of the list, for which sharing did not do.
+// VPL gather: indirect irradiance at every pixel, from every VPL or from the pixel's subset of them. VPLs pass through
+// shared memory in batches of 64.
+//
+// Reads: G-buffer, VPLs, scene length, artist parameters; visibility maps if VISIBILITY_MAP_SIZE > 0; with
+// LISTED_PIXELS, the pixel list. Writes: irradiance [W/m²]; with INTERLEAVE > 1, the direction that the light comes
+// from.
+// Constants: VPL_DISCS (VPLs are clustered disc lights, else points), LISTED_PIXELS (only pixels of the list, for a
+// full gather), INTERLEAVE. Python: renderer/frame/passes/vpl_gather.py. Twin: tuner/surrogate/vpl_gather.py.
+//
+// Interleaved sampling (Keller and Heidrich 2001): the pixels of an n×n block, n = INTERLEAVE, divide the VPLs among
+// themselves, each VPL n² times as bright. A workgroup takes pixels at one position of their blocks, so all its pixels
+// read the same VPLs (Segovia et al. 2006; here by arithmetic on the pixel index). The direction lets the filter
+// convert a pixel's irradiance to its neighbours' normals.
 #include "common/artist_parameters.glsl"
 #include "common/gbuffer.glsl"
 #include "common/scene_length.glsl"
@@ -38,6 +43,7 @@ const int SUBSETS = INTERLEAVE * INTERLEAVE;
 
 shared VirtualPointLight batch[64];
 
+// The pixel of this invocation, or (-1, -1) for none.
 ivec2 own_pixel(int subset) {
     if (LISTED_PIXELS != 0) {
         return listed_pixel(gl_WorkGroupID.xy, gl_LocalInvocationIndex);
@@ -48,7 +54,7 @@ ivec2 own_pixel(int subset) {
 
 void main() {
     int subset = int(gl_WorkGroupID.z);
-    // A run of the R2 sequence is as evenly spread as its start, so each subset is a good set of VPLs.
+    // Any run of the R2 sequence is evenly spread, so each subset is a good set of VPLs.
     int first = subset * vpl_count / SUBSETS;
     int end = (subset + 1) * vpl_count / SUBSETS;
     ivec2 pixel = own_pixel(subset);
@@ -60,7 +66,7 @@ void main() {
 #endif
     Receiver receiver = gbuffer_receiver(clamp(pixel, ivec2(0), size - 1));
     vec3 irradiance = vec3(0.0);
-    vec3 vector_irradiance = vec3(0.0);  // of the sum of channels: times a normal, irradiance on it
+    vec3 vector_irradiance = vec3(0.0);  // sum of channels; its dot product with a normal is the irradiance on it
     for (int start = first; start < end; start += 64) {
         int lane = int(gl_LocalInvocationIndex);
         if (start + lane < end) {
@@ -77,7 +83,7 @@ void main() {
             vec3 arriving = to_vpl * vpl_falloff(to_vpl, vpl, scene_length, parameters);
 #endif
             float received = dot(receiver.normal_world, arriving);
-            // About half of all pairs face away from each other, and need no look at the map.
+            // About half of all pairs face away from each other: they need no lookup in the map.
             if (!(received > 0.0)) {
                 continue;
             }

@@ -1,4 +1,7 @@
-// VPL importance, part 1: what stands in each cell of the RSM.
+// VPL importance, part 1: summarises the RSM in importance cells. One invocation for each cell.
+//
+// Reads: the RSM. Writes: importance cells. Python: renderer/frame/passes/vpl_importance.py.
+// Constants: IMPORTANCE_CELLS, cells along the side of a face, from the same.
 #include "common/rsm.glsl"
 #include "common/vpl_importance_buffers.glsl"
 #include "common/vpl_importance_cell.glsl"

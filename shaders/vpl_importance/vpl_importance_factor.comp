@@ -1,4 +1,7 @@
-// VPL importance, part 4: from importance to a factor of the sampling weight, in place. One workgroup.
+// VPL importance, part 4: turns importance into the factor F of the sampling weight, in place. One workgroup.
+//
+// F = (I / mean I of the lit cells + LEAST_IMPORTANCE)^η. Reads and writes: `vpl_importance`.
+// Constants: LEAST_IMPORTANCE of renderer/frame/passes/vpl_importance.py. Python: the same.
 #include "common/artist_parameters.glsl"
 #include "common/rsm.glsl"
 #include "common/vpl_importance.glsl"

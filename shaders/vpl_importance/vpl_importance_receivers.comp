@@ -1,5 +1,8 @@
-// VPL importance, part 2: surface points spread over the image, and how much indirect light each gets.
-// One workgroup for each point.
+// VPL importance, part 2: receivers spread over the image, and the indirect light that each gets, without visibility.
+// One workgroup for each receiver.
+//
+// Reads: G-buffer, importance cells. Writes: receivers. Python: renderer/frame/passes/vpl_importance.py.
+// Constants: R2_STEP_* of renderer/frame/point_table.py.
 #include "common/gbuffer.glsl"
 
 const float PI = 3.14159265358979;
@@ -15,7 +18,7 @@ void main() {
     int lane = int(gl_LocalInvocationIndex);
     int index = int(gl_WorkGroupID.x);
     ivec2 size = textureSize(gbuffer_depth, 0);
-    // The R2 sequence (Roberts 2018): evenly spread, and at the same places of every frame.
+    // The R2 sequence (Roberts 2018): evenly spread pixels, the same ones in every frame.
     vec2 place = fract(0.5 + float(index + 1) * vec2(R2_STEP_X, R2_STEP_Y));
     Receiver receiver = gbuffer_receiver(min(ivec2(place * vec2(size)), size - 1));
     float irradiance = 0.0;
@@ -29,7 +32,7 @@ void main() {
         barrier();
     }
     if (lane == 0) {
-        // Where nothing is seen, position and sum are no numbers to go on with.
+        // Without a surface, position and sum may be infinite or NaN.
         importance_receivers[index] = receiver.valid
             ? ImportanceReceiver(vec4(receiver.position_world, 1.0), vec4(receiver.normal_world, sums[0]))
             : ImportanceReceiver(vec4(0.0), vec4(0.0));

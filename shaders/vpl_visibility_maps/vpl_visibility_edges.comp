@@ -1,11 +1,15 @@
-// Finds the texels of visibility maps that are to be cast finer, lists them, and puts their blocks' places into the
+// Visibility maps, part 2: finds the texels at silhouettes, lists them, and writes the indices of their blocks into the
 // maps. One workgroup for each VPL.
+//
+// Reads and writes: `visibility_maps`. Writes: the list of texels.
+// Constants: VISIBILITY_BLOCKS, the number of blocks that there is room for. Further silhouettes stay coarse.
+// Python: renderer/frame/passes/vpl_visibility_maps.py.
 #include "common/scene_length.glsl"
 #include "common/virtual_point_lights.glsl"
 
-// 32 KiB with the largest maps, which is what every driver has.
+// 32 KiB for the largest maps (64² texels): every driver has that much shared memory.
 const int TEXELS = VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE;
-shared uvec2 whole_map[TEXELS];  // as it was cast: entries of the map change under the neighbours' eyes
+shared uvec2 whole_map[TEXELS];  // a copy as cast: other invocations overwrite entries of the map itself
 #define SILHOUETTE_ENTRY(texel) whole_map[texel.y * VISIBILITY_MAP_SIZE + texel.x]
 #include "common/visibility_silhouette.glsl"
 #include "common/visibility_edges.glsl"

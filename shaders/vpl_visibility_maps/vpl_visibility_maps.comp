@@ -1,5 +1,7 @@
-// A small map of the surfaces each VPL sees: one ray for each texel of its hemisphere, through the hierarchy.
-// One workgroup for each VPL.
+// Visibility maps, part 1: casts one ray for each texel of each VPL's hemispherical map. One workgroup for each VPL.
+//
+// Reads: VPLs, scene length, ray hierarchy. Writes: `visibility_maps`.
+// Python: renderer/frame/passes/vpl_visibility_maps.py.
 #include "common/visibility_ray.glsl"
 #include "common/visibility_workgroup.glsl"
 

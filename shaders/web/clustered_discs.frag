@@ -1,5 +1,8 @@
-// VPL cells, part 2: each VPL takes the light of its cell, and stands in its middle. One fragment for each VPL,
-// which looks at every sample.
+// Web page, clustered disc lights, part 2 of a Lloyd iteration: each VPL takes the light of its samples and moves to
+// their centroid. One fragment for each VPL; it reads every sample.
+//
+// Reads: samples, their owners, VPLs, moments. Writes: VPLs. Runtime: clustered_discs/clustered_discs.comp.
+// Constants: VPL_COLUMNS of renderer/export/web_page/web_page.py.
 const float PI = 3.14159265358979;
 #include "common/clustered_discs.glsl"
 #include "web/scene_length.glsl"
@@ -14,7 +17,7 @@ layout(location = 0) out vec4 out_position_footprint;
 layout(location = 1) out vec4 out_normal_area;
 layout(location = 2) out vec4 out_flux;
 
-// The sample that is nearest to the middle; among equals the first.
+// The sample of the VPL's cluster that is nearest to the centroid; the first of equally near ones; -1 without any.
 ivec2 sample_nearest_to(int vpl_index, vec3 middle, vec3 normal) {
     float scene_length = measured_scene_length();
     float nearest = 1e30;
@@ -24,7 +27,7 @@ ivec2 sample_nearest_to(int vpl_index, vec3 middle, vec3 normal) {
             ivec2 texel = ivec2(column, row);
             if (texelFetch(vpl_owners, texel, 0).r == vpl_index) {
                 VirtualPointLight one = sample_at(texel);
-                float away = cell_distance(
+                float away = cluster_distance(
                     one.position_footprint.xyz - middle, one.normal_area.xyz, normal, scene_length * scene_length);
                 if (away < nearest) {
                     nearest = away;
@@ -42,10 +45,10 @@ void main() {
     VirtualPointLight vpl = NO_VPL;
     if (vpl_index < vpl_count) {
         vec3 before = vpl_at(vpl_index).position_footprint.xyz;
-        CellSums sums = NO_SAMPLES;
+        ClusterSums sums = NO_SAMPLES;
         for (int row = 0; row < sample_rows; ++row) {
-            // A sum of sums: fewer digits are lost.
-            CellSums sums_of_row = NO_SAMPLES;
+            // Row by row, because a sum of sums loses fewer digits.
+            ClusterSums sums_of_row = NO_SAMPLES;
             for (int column = 0; column < VPL_COLUMNS; ++column) {
                 ivec2 texel = ivec2(column, row);
                 if (texelFetch(vpl_owners, texel, 0).r == vpl_index) {
@@ -54,9 +57,9 @@ void main() {
             }
             sums = joined(sums, sums_of_row);
         }
-        ivec2 middle = sample_nearest_to(vpl_index, before + cell_offset(sums), cell_normal(sums));
+        ivec2 middle = sample_nearest_to(vpl_index, before + cluster_offset(sums), cluster_normal(sums));
         if (middle.x >= 0) {
-            vpl = cell_vpl(sums, before, sample_at(middle));
+            vpl = clustered_disc(sums, before, sample_at(middle));
         }
     }
     out_position_footprint = vpl.position_footprint;

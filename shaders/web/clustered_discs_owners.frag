@@ -1,4 +1,6 @@
-// VPL cells, part 1: the VPL that is nearest to each sample; -1 where the sample is dark.
+// Web page, clustered disc lights, part 1 of a Lloyd iteration: the nearest VPL of each sample; -1 for a dark sample.
+//
+// Reads: samples, VPLs, moments. Writes: owners. Runtime: clustered_discs/clustered_discs_owners.comp.
 const float PI = 3.14159265358979;
 #include "common/clustered_discs.glsl"
 #include "web/scene_length.glsl"
@@ -17,7 +19,7 @@ void main() {
     for (int i = 0; i < vpl_count; ++i) {
         VirtualPointLight vpl = vpl_at(i);
         vec3 between = own.position_footprint.xyz - vpl.position_footprint.xyz;
-        float away = cell_distance(
+        float away = cluster_distance(
             between, own.normal_area.xyz, vpl.normal_area.xyz, scene_length * scene_length);
         if (away < nearest && vpl.normal_area.w > 0.0) {
             nearest = away;

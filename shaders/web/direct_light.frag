@@ -1,4 +1,8 @@
-// Direct irradiance of all lights, shadowed by their RSMs: the loop of shaders/direct_light/direct_light.comp.
+// Web page, direct light: irradiance of all lights, with shadows from their RSMs.
+//
+// Reads: G-buffer, lights, RSM depth. Writes: direct irradiance [W/m²]. Runtime: direct_light/direct_light.comp, which
+// adds the light pre-pass.
+// Constants: LIGHT_COUNT of renderer/export/web_page/web_page.py.
 #include "common/gbuffer.glsl"
 #include "common/rsm.glsl"
 #include "common/shadow.glsl"

@@ -1,6 +1,9 @@
-// The G-buffer, with its reversed depth in a colour target too: WebGL reads no depth buffer as floats.
+// Web page, geometry pass: the runtime's G-buffer, with its reversed depth also in a colour target, from which later
+// passes read it.
+//
+// Reads: the outputs of web/scene.vert. Writes: normal, albedo, depth. Runtime: geometry/geometry.frag, included here.
 #define main surface_main
-#include "geometry.frag"
+#include "geometry/geometry.frag"
 #undef main
 #include "web/plane_depth.glsl"
 #include "web/rounded_normal.glsl"

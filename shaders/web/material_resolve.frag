@@ -1,8 +1,10 @@
-// Radiance towards the eye, as shaders/display/material_resolve.comp has it.
+// Web page, material resolve: radiance towards the eye, L = albedo/π · E.
+//
+// Reads: albedo, direct and indirect irradiance. Writes: radiance. Runtime: display/material_resolve.comp.
 uniform sampler2D gbuffer_albedo;
 uniform sampler2D direct_irradiance;
 uniform sampler2D indirect_irradiance;
-uniform float indirect_share;  // all VPLs over those gathered so far
+uniform float indirect_share;  // number of all VPLs over those gathered so far
 
 layout(location = 0) out vec4 out_radiance;
 

@@ -1,4 +1,7 @@
-// Moments summed over blocks of 8×8, until one texel is left.
+// Web page: sums the moments of the flux over blocks of 8×8 texels. Repeated until one texel is left.
+//
+// Reads and writes: `flux_position`, `flux_square` of web/vpl_weights.frag.
+// Runtime: virtual_point_lights/vpl_marginal_density.comp.
 uniform sampler2D flux_position;
 uniform sampler2D flux_square;
 

@@ -1,9 +1,12 @@
-// Depth from the triangle's plane, not from interpolated positions: software rasterisers interpolate to some 2e-4,
-// which a visibility map's bias of 2e-3 of a distance does not forgive.
+// Web page: depth computed from the plane of the triangle and not interpolated. Software rasterisers interpolate
+// positions to some 2e-4, which is too coarse for the bias of the visibility maps.
+//
+// Provides: `plane_distance`. Reads the flat outputs of web/scene.vert.
 flat in vec3 plane_point;
 flat in vec3 plane_normal;
 
-// How many times `ray` from `start` reaches the plane; `interpolated` where they are all but parallel.
+// The distance from `start` to the plane in units of `ray`'s length. `interpolated` is returned where ray and plane are
+// nearly parallel, or where the two differ by more than 2 %. Both bounds are choices.
 float plane_distance(vec3 start, vec3 ray, float interpolated) {
     float along = dot(plane_normal, ray);
     float distance = dot(plane_normal, plane_point - start) / along;

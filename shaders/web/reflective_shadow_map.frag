@@ -1,6 +1,10 @@
-// One face of the RSM, with its reversed depth in a colour target too.
+// Web page, reflective shadow map: one light face, with its reversed depth also in a colour target, from which later
+// passes read it.
+//
+// Reads: the outputs of web/scene.vert, lights. Writes: normal, reflectance, depth.
+// Runtime: reflective_shadow_map/reflective_shadow_map.frag, included here.
 #define main surface_main
-#include "reflective_shadow_map.frag"
+#include "reflective_shadow_map/reflective_shadow_map.frag"
 #undef main
 #include "web/plane_depth.glsl"
 #include "web/rounded_normal.glsl"

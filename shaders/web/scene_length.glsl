@@ -1,4 +1,6 @@
-// L from the moments' sums, as shaders/virtual_point_lights/vpl_marginal_density.comp has it.
+// Web page: the scene length L from the sums of the moments.
+//
+// Provides: `measured_scene_length` [world units]. Runtime: virtual_point_lights/vpl_marginal_density.comp.
 uniform sampler2D flux_position;
 uniform sampler2D flux_square;
 

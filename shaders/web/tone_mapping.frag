@@ -1,4 +1,6 @@
-// Exposure, tone curve and sRGB encoding.
+// Web page, tone mapping: exposure, tone curve and sRGB encoding.
+//
+// Reads: radiance; exposure in a uniform. Writes: display values. Runtime: display/tone_mapping.comp.
 #include "common/tone_curve.glsl"
 
 uniform sampler2D radiance;

@@ -1,4 +1,7 @@
-// One VPL for each texel of three targets, VPL_COLUMNS in a row.
+// Web page: draws one VPL, or one RSM sample, for each texel of three targets, VPL_COLUMNS in a row.
+//
+// Reads: the RSM, running sums, importance, the point table. Writes: VPLs.
+// Runtime: virtual_point_lights/virtual_point_lights.comp.
 #include "common/rsm.glsl"
 #include "common/virtual_point_lights.glsl"
 #include "web/vpl_sums.glsl"

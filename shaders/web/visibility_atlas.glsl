@@ -1,5 +1,7 @@
-// Visibility maps one after another in the rows of a texture, and in the place of each of their texels a block of
-// finer ones in another.
+// Web page: the visibility maps in textures. One texture holds all maps one after another, in rows of DATA_COLUMNS
+// texels; another holds, for each of those texels, room for a block of finer texels.
+//
+// Provides: all of common/vpl_visibility.glsl. Constants: DATA_COLUMNS of renderer/export/web_page/web_page.py.
 uniform usampler2D visibility_atlas;
 uniform usampler2D visibility_details;
 

@@ -1,5 +1,7 @@
-// The surface that a VPL sees along an axis of its hemisphere, as shaders/common/visibility_ray.glsl has it: one ray
-// through one tree of boxes over all triangles as they stand in the world.
+// Web page: one ray of a VPL's visibility map, through a single tree of boxes over all triangles in world space.
+//
+// Provides: `cast_visibility_texel`. Runtime: common/visibility_ray.glsl.
+// Constants: RAY_COUNT_BITS, RAY_STACK_SIZE, RAY_ROOT and DATA_COLUMNS of renderer/export/web_page/web_page.py.
 #include "common/virtual_point_lights.glsl"
 #include "common/ray_intersection.glsl"
 #include "web/scene_length.glsl"
@@ -11,9 +13,11 @@ uniform sampler2D ray_triangles;   // three texels each
 uniform int vpl_count;
 uniform float longest;
 
+// As in common/ray_hierarchy.glsl.
 const uint RAY_COUNT_MASK = (1u << RAY_COUNT_BITS) - 1u;
-const uint RAY_DONE = 0xFFFFFFFFu;
+const uint RAY_DONE = 0xFFFFFFFFu; // neither a node nor a triangle
 
+// The texel that holds the element at `index` of a data texture.
 ivec2 data_texel(uint index) {
     return ivec2(int(index) % DATA_COLUMNS, int(index) / DATA_COLUMNS);
 }
@@ -25,7 +29,7 @@ RayTriangle triangle_at(uint index) {
         texelFetch(ray_triangles, data_texel(3u * index + 2u), 0).xyz);
 }
 
-// Where the ray enters a node's box, or RAY_MISS; and the node's child.
+// The distance at which the ray enters a node's box, or RAY_MISS; and the node's child.
 float node_distance(SpaceRay ray, uint node, float nearest, out uint child) {
     uvec4 low = texelFetch(ray_nodes, data_texel(2u * node), 0);
     uvec4 high = texelFetch(ray_nodes, data_texel(2u * node + 1u), 0);
@@ -33,7 +37,7 @@ float node_distance(SpaceRay ray, uint node, float nearest, out uint child) {
     return box_distance(ray, uintBitsToFloat(low.xyz), uintBitsToFloat(high.xyz), nearest);
 }
 
-// The nearest triangle on a ray, and its distance; RAY_DONE where there is none nearer than `longest`.
+// The index of the nearest triangle on a ray within `nearest`, which becomes its distance; RAY_DONE without a hit.
 uint nearest_triangle(SpaceRay ray, inout float nearest) {
     uint stack[RAY_STACK_SIZE];
     int height = 0;
@@ -61,6 +65,7 @@ uint nearest_triangle(SpaceRay ray, inout float nearest) {
     return found;
 }
 
+// The map entry for one ray from a VPL; `axis` is its unit direction in the VPL's frame.
 uvec2 cast_visibility_texel(VirtualPointLight vpl, vec3 axis) {
     float scene_length = measured_scene_length();
     mat3 frame = hemisphere_frame(vpl.normal_area.xyz);

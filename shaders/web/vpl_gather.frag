@@ -1,5 +1,8 @@
-// Indirect irradiance from some of the VPLs, added to what earlier ones gave. With VPL_DISCS, VPLs shine as discs,
-// and else as points.
+// Web page, VPL gather: irradiance from some of the VPLs, added to that of earlier ones.
+//
+// Reads: G-buffer, VPLs, moments, the earlier irradiance, and visibility maps if VISIBILITY_MAP_SIZE > 0.
+// Writes: irradiance [W/m²]. With VPL_DISCS, VPLs shine as discs, otherwise as points.
+// Runtime: vpl_gather/vpl_gather.comp.
 #include "common/gbuffer.glsl"
 #include "common/virtual_point_lights.glsl"
 #include "web/scene_length.glsl"
@@ -18,7 +21,7 @@ uniform float visibility_softness;
 #endif
 
 uniform sampler2D earlier;
-uniform int first;
+uniform int first;  // VPLs from first up to, but not including, end
 uniform int end;
 uniform float intensity;
 uniform float falloff_footprint;

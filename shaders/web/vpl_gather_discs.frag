@@ -1,3 +1,3 @@
-// The gather from VPLs that are cells, and shine as discs.
+// Web page, VPL gather from clustered disc lights.
 #define VPL_DISCS
 #include "web/vpl_gather.frag"

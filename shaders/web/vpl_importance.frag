@@ -1,5 +1,7 @@
-// VPL importance, part 3: how much error on the image a cell would leave if its light were drawn too seldom, by the
-// formula of shaders/vpl_importance/vpl_importance.comp.
+// Web page, VPL importance, part 3: the error in the image if an importance cell's light is drawn too seldom.
+//
+// Reads: importance cells, receivers. Writes: importance. One fragment for each cell.
+// Runtime and formula: vpl_importance/vpl_importance.comp.
 const float PI = 3.14159265358979;
 #include "web/vpl_importance_texture.glsl"
 

@@ -1,4 +1,6 @@
-// VPL importance, part 1: what stands in each cell of the RSM, laid out as its faces are.
+// Web page, VPL importance, part 1: summarises the RSM in importance cells, laid out as its faces are.
+//
+// Reads: the RSM. Writes: importance cells. Runtime: vpl_importance/vpl_importance_cells.comp.
 #include "common/rsm.glsl"
 #include "common/vpl_importance_form.glsl"
 #include "common/vpl_importance_cell.glsl"

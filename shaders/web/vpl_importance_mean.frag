@@ -1,4 +1,6 @@
-// VPL importance, part 4: its mean over the lit cells.
+// Web page, VPL importance, part 4: the mean importance over the lit cells. One fragment.
+//
+// Reads: importance. Writes: its mean. Runtime: vpl_importance/vpl_importance_factor.comp, which also applies it.
 uniform sampler2D importance;
 
 layout(location = 0) out float out_mean;

@@ -1,4 +1,6 @@
-// VPL importance, part 2: surface points spread over the image, and how much indirect light each gets.
+// Web page, VPL importance, part 2: receivers spread over the image, and the indirect light that each gets.
+//
+// Reads: G-buffer, importance cells. Writes: receivers. Runtime: vpl_importance/vpl_importance_receivers.comp.
 #include "common/gbuffer.glsl"
 
 const float PI = 3.14159265358979;
@@ -9,7 +11,7 @@ layout(location = 1) out vec4 out_normal_irradiance;
 
 void main() {
     ivec2 size = textureSize(gbuffer_depth, 0);
-    // The R2 sequence (Roberts 2018): evenly spread, and at the same places of every frame.
+    // The R2 sequence (Roberts 2018): evenly spread pixels, the same ones in every frame.
     vec2 place = fract(0.5 + float(int(gl_FragCoord.x) + 1) * vec2(R2_STEP_X, R2_STEP_Y));
     Receiver receiver = gbuffer_receiver(min(ivec2(place * vec2(size)), size - 1));
     out_position_valid = vec4(0.0);

@@ -1,4 +1,4 @@
-// Cells of the RSM from textures.
+// Web page: reads importance cells from textures. Provides: `importance_cell_at`.
 #include "common/vpl_importance_form.glsl"
 
 uniform sampler2D cell_position_flux;

@@ -1,4 +1,4 @@
-// Samples of the RSM from textures, laid out as VPLs are.
+// Web page: reads RSM samples from textures, laid out as VPLs are. Provides: `sample_at`.
 uniform sampler2D sample_position_footprint;
 uniform sampler2D sample_normal_area;
 uniform sampler2D sample_flux;

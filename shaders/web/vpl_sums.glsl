@@ -1,4 +1,7 @@
-// What shaders/common/vpl_placement.glsl asks for, from textures.
+// Web page: what common/vpl_placement.glsl needs, read from textures.
+//
+// Provides: `sum_in_row`, `sum_of_rows`, `sampling_weight`, `total_weight`, `vpl_count`, `rows`.
+// Constants: IMPORTANCE_CELLS, 0 without importance; LEAST_IMPORTANCE of renderer/frame/passes/vpl_importance.py.
 uniform sampler2D sums_in_rows;   // running sums of the sampling weights along the rows of the RSM atlas
 uniform sampler2D sums_of_rows;   // one column: running sums of the rows' totals
 uniform int vpl_count;
@@ -6,7 +9,7 @@ uniform int rows;
 uniform float density_exponent;
 #if IMPORTANCE_CELLS > 0
 uniform float density_importance;
-uniform sampler2D importance;       // of the light in each cell of the atlas
+uniform sampler2D importance;       // one texel for each importance cell
 uniform sampler2D mean_importance;  // one texel
 #endif
 
@@ -18,6 +21,7 @@ float sum_of_rows(int row) {
     return texelFetch(sums_of_rows, ivec2(0, row), 0).r;
 }
 
+// flux^γ times the importance factor. Runtime: common/vpl_importance.glsl and vpl_importance_factor.comp.
 float sampling_weight(ivec2 texel, float flux) {
     float weight = pow(flux, density_exponent);
 #if IMPORTANCE_CELLS > 0
@@ -30,4 +34,5 @@ float sampling_weight(ivec2 texel, float flux) {
     return weight;
 }
 
+// The last running sum. The runtime has it in the frame statistics.
 #define total_weight sum_of_rows(rows - 1)

@@ -1,4 +1,4 @@
-// VPLs from textures, VPL_COLUMNS in a row.
+// Web page: reads VPLs from textures, VPL_COLUMNS in a row. Provides: `vpl_at`.
 uniform sampler2D vpl_position_footprint;
 uniform sampler2D vpl_normal_area;
 uniform sampler2D vpl_flux;

@@ -1,4 +1,6 @@
-// One texel of a block that stands for a visibility map's texel, where a silhouette runs through that.
+// Web page, visibility maps, part 3: one finer texel of a block, where a silhouette runs through the block's texel.
+//
+// Reads: maps, VPLs, ray tree. Writes: blocks. Runtime: vpl_visibility_maps/vpl_visibility_details.comp.
 #include "web/visibility_ray.glsl"
 
 layout(location = 0) out uvec2 out_texel;

@@ -1,4 +1,7 @@
-// A visibility map's texel once more, or the place of its block where a silhouette runs through.
+// Web page, visibility maps, part 2: copies a texel, or replaces it by the index of its block where a silhouette runs
+// through it.
+//
+// Reads: maps as cast. Writes: maps. Runtime: vpl_visibility_maps/vpl_visibility_edges.comp.
 #include "common/virtual_point_lights.glsl"
 #include "web/scene_length.glsl"
 #include "web/visibility_atlas.glsl"

@@ -1,4 +1,6 @@
-// One texel of a VPL's visibility map.
+// Web page, visibility maps, part 1: casts one texel of a VPL's map.
+//
+// Reads: VPLs, ray tree, moments. Writes: maps. Runtime: vpl_visibility_maps/vpl_visibility_maps.comp.
 #include "web/visibility_ray.glsl"
 
 layout(location = 0) out uvec2 out_texel;

@@ -1,4 +1,6 @@
-// The sampling weight of every RSM texel, and the moments of its flux.
+// Web page: the sampling weight of every RSM texel, and the moments of its flux.
+//
+// Reads: the RSM, importance. Writes: weights and moments. Runtime: virtual_point_lights/vpl_row_density.comp.
 #include "common/rsm.glsl"
 #include "web/vpl_sums.glsl"
 

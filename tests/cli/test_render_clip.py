@@ -147,7 +147,7 @@ def test_a_clip_that_fails_leaves_the_old_one(tmp_path, monkeypatch):
     [
         ("clip.mp4", ["--size", "33x24"], "an .mp4 must have even sides, got 33x24"),
         ("clip.gif", [], "a clip must be an .mp4 or a folder for .png files, got '.gif'"),
-        ("file", [], "must be a folder for .png files, and is a file"),
+        ("file", [], "must be a folder for .png files, got a file"),
         ("clip.mp4", ["--fps", "0"], "--fps: must lie in [0.1, 1000], got 0.0"),
         ("clip.mp4", ["--fps", "nan"], "--fps: must lie in [0.1, 1000], got nan"),
         ("clip.mp4", ["--frames", "0"], "--frames"),

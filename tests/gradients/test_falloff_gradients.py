@@ -1,4 +1,4 @@
-"""Gradients against finite differences of the runtime's own image, and against their definition."""
+"""Gradients against finite differences of the runtime's image, and against the gather pair by pair."""
 
 from dataclasses import replace
 from functools import partial
@@ -29,11 +29,12 @@ WITHOUT_MAPS = TunedConfig(visibility="transmittance")
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 @pytest.mark.parametrize("name", STEP)
 def test_gradient_is_the_runtimes_own(gl_context, light, name, start):
-    """Derivative of every pixel with respect to each parameter, the GLSL's by central differences.
+    """The derivative of every pixel by each parameter matches central differences of the GLSL image.
 
-    Central differences of step h err by h²/6 of the third derivative, about 1e-3 here, and float32 images
-    add 1e-6/h: the cosine between the two derivative images is above 0.99999, their sizes agree to 0.3 %.
-    A disc's edge passes over some receivers as α moves: with a tenth of the step, 0.998 and 3 %.
+    Central differences with step h err by h²/6 of the third derivative, about 1e-3 here, and float32 adds
+    1e-6/h. So the cosine between the two derivative images is above 0.99999, and their norms agree to 0.3 %.
+    For discs, edges pass over some receivers as α changes: with a tenth of the step, the bounds are 0.998 and
+    3 %.
     """
     cells = start.lloyd_iterations > 0
     step = STEP[name] / (10.0 if cells and name == "falloff_footprint" else 1.0)
@@ -57,9 +58,9 @@ def test_gradient_is_the_runtimes_own(gl_context, light, name, start):
 
 
 def test_tabulated_gradient_follows_the_full_gather(gl_context):
-    """The loss gradient that the fit descends, from tables, against that of the full gather.
+    """The loss gradient through the table matches the full gather's to 2 % of the largest component.
 
-    Within 2 % of the larger component: the table errs by up to 0.1 % in the image.
+    The table errs by up to 0.1 % in the image.
     """
     captured = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context).capture(room_view("spot"))
     receivers, vpls = gather_inputs(captured)
@@ -80,9 +81,9 @@ def test_tabulated_gradient_follows_the_full_gather(gl_context):
 @pytest.mark.parametrize("cells", [False, True], ids=["points", "cells"])
 @pytest.mark.parametrize("moving", [("falloff",), ("falloff", "vpls")])
 def test_gradient_of_the_gather_is_that_of_its_definition(moving, cells):
-    """Of a weighted sum, forward and in reverse, whether α and κ move, the VPLs, or both.
+    """Forward and reverse derivatives of a weighted sum match those of the gather pair by pair.
 
-    1e-3 of the largest component: float32 in another order, and a disc's edge is steep.
+    They agree to 1e-3 of the largest component: float32 in another order, and the edges of discs are steep.
     """
     receivers, vpls = corner(np.random.default_rng(3), 60, 30)
     vpls = replace(vpls, cells=cells)
@@ -104,7 +105,7 @@ def test_gradient_of_the_gather_is_that_of_its_definition(moving, cells):
 
 
 def test_the_gather_is_linear_in_visibility():
-    """Its derivative along the visibility itself is the image; so is the gradient's product with it."""
+    """The derivative along the visibility itself is the image, and gradient · visibility is its sum."""
     receivers, vpls = corner(np.random.default_rng(3), 60, 30)
     point = FalloffParameters(*map(jnp.float32, (1.3, 0.7, 0.6)))
     seen = jnp.asarray(np.random.default_rng(4).random((60, 30)), jnp.float32)
@@ -115,7 +116,7 @@ def test_the_gather_is_linear_in_visibility():
 
 
 def test_gradient_is_finite_where_receiver_and_vpl_coincide():
-    """d = 0, α at its bound, κ at zero: the hard points of every quotient and root."""
+    """The hard cases for quotients and roots: d = 0, α at its bounds, κ = 0."""
     from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
 
     receivers = Receivers(jnp.zeros((4, 3)), jnp.tile(jnp.array([0.0, 1.0, 0.0]), (4, 1)))

@@ -1,4 +1,4 @@
-"""The surrogate against the runtime: the same buffers, the same light."""
+"""The surrogate's gather against the runtime's, on the same buffers."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ PARAMETERS = (
     ArtistParameters(intensity=3.0, falloff_footprint=0.1, extinction_coefficient=0.0),
 )
 
-# What maps add has twins of its own: test_visibility_twins.py.
+# Visibility maps have their own twins in test_visibility_twins.py.
 WITHOUT_MAPS = TunedConfig(visibility="transmittance")
 
 
@@ -61,7 +61,7 @@ def twin_error(runtime: Runtime, view: View, parameters: ArtistParameters) -> fl
     receivers, vpls = gather_inputs(captured)
     image = np.asarray(jax.jit(gather)(receivers, vpls, FalloffParameters.of(parameters)))
     drawn = captured.indirect_irradiance[captured.valid]
-    if not drawn.any():  # four plates in a plane light nothing: both must say so
+    if not drawn.any():  # for example four plates in one plane: both must be black
         assert not image.any()
         return 0.0
     return relative_rms(image, drawn)
@@ -70,7 +70,7 @@ def twin_error(runtime: Runtime, view: View, parameters: ArtistParameters) -> fl
 @pytest.mark.parametrize("parameters", (*PARAMETERS, *CELLS))
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_twins_agree_in_the_room(gl_context, light, parameters):
-    """Relative RMSE below 1e-4: both sides work in float32, in different coordinates."""
+    """The relative RMSE is below 1e-4: both twins use float32, in different coordinates."""
     runtime = Runtime(colored_room(), TunedConfig(parameters, visibility="transmittance"), context=gl_context)
     assert twin_error(runtime, room_view(light), parameters) < 1e-4
 
@@ -87,20 +87,20 @@ def scene_twin_error(path, gl_context) -> float:
 
 @pytest.mark.parametrize("path", OWN_SCENES, ids=lambda path: path.stem)
 def test_twins_agree_on_our_scenes(gl_context, path):
-    """Relative RMSE below 1e-4 at 0.1 m, 5 m and 50 m."""
+    """The relative RMSE is below 1e-4 for scenes of 0.1 m, 5 m and 50 m."""
     assert scene_twin_error(path, gl_context) < 1e-4
 
 
 @pytest.mark.parametrize("name", OUTSIDE_SCENES)
 def test_twins_agree_on_scenes_of_others(gl_context, scenes_folder, name):
-    """Relative RMSE below 1e-3, the bound for any scene at all; most are below 1e-5."""
+    """The relative RMSE is below 1e-3, the bound for any scene; most are below 1e-5."""
     assert scene_twin_error(outside_scene(scenes_folder, name), gl_context) < 1e-3
 
 
 @pytest.mark.parametrize("config", [WITHOUT_MAPS, replace(WITHOUT_MAPS, parameters=CELLS[0])])
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_factored_gather_equals_its_definition(gl_context, light, config):
-    """Axis by axis against pair by pair, 1e-4 relative RMSE: float32 in another order."""
+    """Axis by axis and pair by pair agree to a relative RMSE of 1e-4: float32 in another order."""
     captured = Runtime(colored_room(), config, context=gl_context).capture(room_view(light, (32, 24)))
     receivers, vpls = gather_inputs(captured)
     for parameters in map(FalloffParameters.of, PARAMETERS):
@@ -110,7 +110,7 @@ def test_factored_gather_equals_its_definition(gl_context, light, config):
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_tabulated_gather_is_close(gl_context, light):
-    """Over the range that fits end in, interpolation between nodes costs less than 0.2 % relative RMSE."""
+    """In the range where fits end, interpolation between nodes errs by less than 0.2 % relative RMSE."""
     captured = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context).capture(room_view(light))
     receivers, vpls = gather_inputs(captured)
     table = tabulate_gather(receivers, vpls)
@@ -123,7 +123,7 @@ def test_tabulated_gather_is_close(gl_context, light):
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_tabulated_gather_of_discs_is_close(gl_context, light):
-    """4 % for 32 discs, as the edge of one passes over a receiver between nodes of α. At α = 1, 0.3 %."""
+    """The error is below 4 % for 32 discs, whose edges cross receivers between nodes of α; 0.3 % at α = 1."""
     config = replace(WITHOUT_MAPS, parameters=CELLS[0])
     captured = Runtime(colored_room(), config, context=gl_context).capture(room_view(light))
     receivers, vpls = gather_inputs(captured)
@@ -138,7 +138,7 @@ def test_tabulated_gather_of_discs_is_close(gl_context, light):
 
 
 def test_hidden_vpls_give_nothing(gl_context):
-    """A visibility mask takes out exactly the pairs it names, in both forms of the gather."""
+    """A visibility mask removes exactly its pairs, in the full and in the tabulated gather."""
     captured = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context).capture(room_view("spot", (32, 24)))
     receivers, vpls = gather_inputs(captured)
     parameters = FalloffParameters.of(ArtistParameters())
@@ -152,7 +152,7 @@ def test_hidden_vpls_give_nothing(gl_context):
 
 
 def test_nothing_lit_is_finite():
-    """No light, no VPL flux: the twin gives zeros, not NaN."""
+    """Without VPL flux the twins return zeros, not NaN."""
     floor = colored_room()
     camera = Camera(look_at(np.array([0.0, 0.0, 3.6]), np.zeros(3)), 0.7)
     away = Light("spot", np.ones(3), np.array([0.0, 0.0, 3.0]), np.array([0.0, 0.0, 1.0]), 0.1, 0.3)
@@ -166,14 +166,14 @@ def test_nothing_lit_is_finite():
 
 @pytest.mark.parametrize("vpls", [1, 3, 1_000, 70_000, 2**21])
 def test_pairs_at_once_are_bounded(vpls):
-    """Never more than asked for, unless one receiver alone has more; never fewer than a quarter of it."""
+    """A chunk has at most the given number of pairs, or a single receiver, and at least a quarter of them."""
     receivers = receivers_at_once(vpls, PAIRS_AT_ONCE)
     assert receivers >= 1
     assert receivers == 1 or PAIRS_AT_ONCE / 4 < receivers * vpls <= PAIRS_AT_ONCE
 
 
 def test_chunks_do_not_show():
-    """Few receivers and very many VPLs are gathered and tabulated as they are in one piece."""
+    """Few receivers and very many VPLs, gathered and tabulated in chunks, give the same as in one piece."""
     random = np.random.default_rng(5)
     receivers, vpls = corner(random, 37, 20_000)
     parameters = FalloffParameters.of(ArtistParameters())

@@ -1,4 +1,4 @@
-"""Scene statistics: the GPU's against their twin in numpy; ratios, the same at every scale, finite always."""
+"""Scene statistics: the GPU agrees with the numpy twin; they are finite ratios, independent of scale."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def measured(runtime: Runtime, view: View) -> np.ndarray:
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 @pytest.mark.parametrize("vpl_count", [3, 300])
 def test_twins_agree(gl_context, light, visibility, vpl_count):
-    """To 2e-3: pixels at an edge of what a VPL sees, or on one plane with it, may fall either way."""
+    """They agree to 2e-3: pixels at a shadow edge, or in the plane of a VPL, may fall either way."""
     runtime = runtime_of(gl_context, visibility, vpl_count)
     captured = runtime.capture(room_view(light))
     ours = runtime.scene_statistics(room_view(light))
@@ -36,7 +36,7 @@ def test_twins_agree(gl_context, light, visibility, vpl_count):
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_statistics_have_no_unit(gl_context, light):
-    """Scene and light ×0.01 and ×100: the same ratios, to what rounding moves across an edge."""
+    """Scaling scene and light by 0.01 and 100 changes nothing but pixels that rounding moves across edges."""
     plain = measured(runtime_of(gl_context), room_view(light))
     for factor in (0.01, 100.0):
         other = measured(runtime_of(gl_context, factor=factor), scaled_view(room_view(light), factor))
@@ -45,7 +45,7 @@ def test_statistics_have_no_unit(gl_context, light):
 
 @pytest.mark.parametrize("light", [None, *ROOM_LIGHTS])
 def test_statistics_are_ratios(gl_context, light):
-    """In [0, 1] and finite: lit, unlit, and with the camera turned away from everything."""
+    """They are finite and in [0, 1], with and without light, and if the camera sees nothing."""
     runtime = runtime_of(gl_context)
     away = Camera(look_at(np.array([0.0, 0.0, 3.6]), np.array([0.0, 0.0, 9.0])), 0.7)
     view = room_view(light)
@@ -56,7 +56,7 @@ def test_statistics_are_ratios(gl_context, light):
 
 
 def test_darkness_has_its_own_numbers(gl_context):
-    """No light: all that could be seen is seen, and of nothing is there any."""
+    """Without light, `visible` is 1, and every other statistic of the light is 0."""
     found = dict(zip(STATISTIC_NAMES, measured(runtime_of(gl_context), room_view(None)), strict=True))
     assert found.pop("visible") == 1.0
     assert found.pop("vpl_count") == pytest.approx(6.0 / 16.0)

@@ -1,4 +1,4 @@
-"""Visibility maps: what they hold against true rays, and the shader's lookup against its twin in JAX."""
+"""Visibility maps: the shader's lookup against its JAX twin, and properties that true visibility has."""
 
 import jax
 import jax.numpy as jnp
@@ -42,10 +42,10 @@ def surrogate(captured: CapturedFrame, parameters: ArtistParameters) -> np.ndarr
 @pytest.mark.parametrize(("bias", "softness"), [(0.0001, 0.0005), (0.0005, 0.001), (0.1, 0.5)])
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_twins_agree_in_the_room(gl_context, light, bias, softness):
-    """1e-3 relative RMSE over all pixels, those on a shadow's edge included.
+    """The relative RMSE is below 1e-3 over all pixels, including those at shadow edges.
 
-    A pair may lie so close to the border of two texels that rounding decides between them: of 10⁶ pairs some
-    ten, each with a 256th of a pixel's light.
+    For some ten of 10⁶ pairs, rounding decides between two adjacent texels; each has a 256th of a pixel's
+    light.
     """
     parameters = ArtistParameters(vpl_count=256, visibility_bias=bias, visibility_softness=softness)
     runtime = Runtime(colored_room(), TunedConfig(parameters, visibility="maps"), context=gl_context)
@@ -78,7 +78,7 @@ def test_twins_agree_on_scenes_of_others(gl_context, scenes_folder, name):
 
 
 def test_hemi_octahedral_map_is_one_to_one():
-    """Decode, encode: back at the same place to 1e-6; and every direction is of the upper hemisphere."""
+    """Encoding a decoded point returns it to 1e-6, and every decoded direction is in the upper hemisphere."""
     grid = np.stack(np.meshgrid(np.linspace(-1, 1, 33), np.linspace(-1, 1, 33)), axis=-1).astype(np.float32)
     direction = hemi_octahedral_decode(jnp.asarray(grid))
     assert float(direction[..., 2].min()) >= -1e-6
@@ -86,7 +86,7 @@ def test_hemi_octahedral_map_is_one_to_one():
 
 
 def walled_scene(with_wall: bool):
-    """A floor lit on its left half only; a wall between the halves, or none."""
+    """A floor with a wall at its left edge, and optionally a second wall across its middle."""
     meshes = [quad((-2, 0, -2), (0, 0, 4), (4, 0, 0), 0, "floor"), quad((-2, 0, -2), (0, 2, 0), (0, 0, 4))]
     if with_wall:
         meshes.append(quad((0, 0, -2), (0, 2, 0), (0, 0, 4), 0, "wall"))
@@ -94,7 +94,7 @@ def walled_scene(with_wall: bool):
 
 
 def behind_the_wall(gl_context, with_wall: bool, visibility: str) -> np.ndarray:
-    """Irradiance on a patch of floor at x = 1, lit only by the far wall on the left."""
+    """Indirect irradiance on a patch of floor at x = 1, which only the left wall lights."""
     light = Light("spot", np.full(3, 9.0), np.array([-1.0, 1.5, 0.0]), np.array([-0.8, -0.6, 0.0]), 0.3, 0.5)
     target = np.array([1.0, 0.0, 0.0])
     camera = Camera(look_at(target + np.array([0.3, 1.5, 0.0]), target), 0.15)
@@ -107,10 +107,10 @@ def behind_the_wall(gl_context, with_wall: bool, visibility: str) -> np.ndarray:
 
 
 def test_a_wall_stops_the_light(gl_context):
-    """A wall without thickness that stands on the floor, between VPLs and receivers: 1 % passes at most.
+    """At most 1 % passes a wall of zero thickness that stands on the floor between VPLs and receivers.
 
-    From VPLs that stand low: the ray nearest to an almost level direction may dip towards the floor and meet
-    it before the wall.
+    That light comes from low VPLs: the map's nearest ray to a nearly horizontal direction may hit the floor
+    before the wall.
     """
     passing = behind_the_wall(gl_context, True, "transmittance")
     assert passing.min() > 0.0
@@ -118,16 +118,17 @@ def test_a_wall_stops_the_light(gl_context):
 
 
 def test_nothing_between_leaves_light_as_it_is(gl_context):
-    """In an open, convex scene maps take nothing away, whatever their resolution."""
+    """In an open, convex scene, maps remove no light at all."""
     free, seen = (behind_the_wall(gl_context, False, mode) for mode in ("transmittance", "maps"))
     np.testing.assert_array_equal(seen, free)
 
 
 @pytest.mark.parametrize("factor", [0.01, 0.1, 10.0, 100.0])
 def test_scale_changes_nothing(gl_context, factor):
-    """With visibility on, a scaled scene gives the same image to 1e-3 relative RMSE.
+    """With maps, a scaled scene gives the same image to a relative RMSE of 1e-3.
 
-    Rays that graze an edge may pass it on the other side after rounding: one texel of one map.
+    Because of rounding, a ray that grazes an edge may pass it on the other side, which changes one texel of a
+    map.
     """
     image = Runtime(colored_room(), MAPS, context=gl_context).render(room_view("spot"), "irradiance")
     grown = Runtime(scaled(colored_room(), factor), MAPS, context=gl_context)
@@ -136,7 +137,7 @@ def test_scale_changes_nothing(gl_context, factor):
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_more_vpls_keep_the_mean(gl_context, light):
-    """Doubling N with visibility on moves the mean irradiance by less than 1 %, as without."""
+    """Doubling the VPL count with maps changes the mean irradiance by less than 1 %, as without maps."""
     means = []
     for count in (1024, 2048):
         config = TunedConfig(ArtistParameters(vpl_count=count), visibility="maps")
@@ -146,7 +147,7 @@ def test_more_vpls_keep_the_mean(gl_context, light):
 
 
 def test_finer_texels_lie_at_silhouettes_alone(gl_context):
-    """Boxes in a room refine some texels; a floor with two walls, an open, convex scene, refines none."""
+    """A room with a board in it has some refined texels. A floor with a wall, which is convex, has none."""
     room = Runtime(colored_room(), MAPS, context=gl_context).capture(room_view("spot")).visibility_maps
     assert 0.01 < (room.block >= 0).mean() < 0.2
     assert len(room.block_distance) == (room.block >= 0).sum()
@@ -155,9 +156,9 @@ def test_finer_texels_lie_at_silhouettes_alone(gl_context):
 
 
 def test_refined_maps_are_nearly_maps_so_much_finer(gl_context):
-    """24² texels refined 2 times, against 48²: a third of the error of 24² alone; a fifth was measured.
+    """Maps of 24² texels, refined 2 times, have less than a third of the error of 24² alone, against 48².
 
-    What is left: things so small that none of a texel's neighbours met them.
+    A fifth was measured. The remaining error is due to objects so small that no neighbouring texel hit them.
     """
     scene, view = colored_room(), room_view("spot")
 

@@ -1,4 +1,4 @@
-"""Planted parameters come back from the runtime's own images."""
+"""A fit recovers planted falloff parameters from the runtime's own images."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -19,7 +19,7 @@ from vpltune.tuner.surrogate.virtual_point_lights import gather_inputs
 from vpltune.tuner.surrogate.vpl_gather import FalloffParameters
 
 PLANTED = ArtistParameters(intensity=1.35, falloff_footprint=0.8, extinction_coefficient=0.7, vpl_count=256)
-# Maps have parameters of their own, planted in test_planted_visibility.py.
+# The parameters of visibility maps are planted in test_planted_visibility.py.
 WITHOUT_MAPS = TunedConfig(visibility="transmittance")
 
 
@@ -39,7 +39,7 @@ def planted_views(gl_context):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_recovery_from_a_random_start(planted_views, seed):
-    """k, α and κ within 1 % from anywhere in their ranges; the tabulated surrogate accounts for most."""
+    """k, α and κ are recovered within 1 % from a random start. Most of the error is that of the table."""
     space = SearchSpace()
     start = space.parameters(np.random.default_rng(seed).random(3), PLANTED)
     fit = fit_placement(planted_views, start)
@@ -50,7 +50,7 @@ def test_recovery_from_a_random_start(planted_views, seed):
 
 
 def test_a_fit_never_ends_above_its_start(planted_views):
-    """Started at the answer, and given one turn, it still does not get worse."""
+    """A fit that starts at the planted parameters and runs for one turn does not get worse."""
     fit = fit_placement(planted_views, PLANTED, turns=1)
     tuned, result = fit.parameters, fit.descent
     assert result.loss <= result.start_loss
@@ -58,7 +58,7 @@ def test_a_fit_never_ends_above_its_start(planted_views):
 
 
 def test_nothing_lit_is_a_status(gl_context):
-    """A view without light is no error: the start is kept, and the status says why."""
+    """For a view without light the fit keeps the start, and its status says why."""
     runtime = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context)
     view = drawn_by_the_runtime(runtime, None, PLANTED)
     fit = fit_placement((view,), PLANTED)
@@ -67,10 +67,11 @@ def test_nothing_lit_is_a_status(gl_context):
 
 
 def test_noise_is_not_fitted(planted_views):
-    """With 6 % of independent noise on each half, a noise floor of 1.8e-3, parameters come back within 2 %.
+    """With 6 % independent noise on each half, parameters are recovered within 2 %.
 
-    That is twice the floor at which references stop. The weights are noisy as well, which biases the
-    intensity by about −2 floors, −0.4 %; the rest of the bound is for parameters that trade with it.
+    The noise floor is then 1.8e-3, about twice the default target of references. The weights are noisy too,
+    which biases the intensity by about −2 floors, −0.4 %. The rest of the bound is for parameters that trade
+    off against it.
     """
     random = np.random.default_rng(1)
     noisy = []
@@ -89,7 +90,7 @@ def test_noise_is_not_fitted(planted_views):
 
 
 def test_the_surrogate_is_what_was_planted(planted_views):
-    """The tabulated image at the planted parameters is the runtime's: 0.3 % relative RMSE."""
+    """The tabulated image at the planted parameters matches the runtime's to a relative RMSE of 0.3 %."""
     for view in planted_views:
         receivers, vpls = gather_inputs(view.captured)
         parameters = FalloffParameters(

@@ -1,4 +1,4 @@
-"""Bias and softness of visibility maps, and their gradients, come back from the runtime's own images."""
+"""A fit recovers bias and softness of visibility maps from the runtime's own images; gradients match."""
 
 from dataclasses import replace
 
@@ -39,7 +39,7 @@ def drawn_by_the_runtime(gl_context, light: str, parameters: ArtistParameters) -
 
 
 def test_recovery(gl_context):
-    """From the defaults, 40 and 200 times too small: within 5 %, what the grid of overlaps leaves."""
+    """β and σ are recovered within 5 %, the error of the grid, from starts 40 and 200 times smaller."""
     views = tuple(drawn_by_the_runtime(gl_context, light, PLANTED) for light in ("spot", "point"))
     start = replace(
         PLANTED,
@@ -53,9 +53,9 @@ def test_recovery(gl_context):
 
 
 def test_gradients_against_differences_of_the_drawn_image(gl_context):
-    """dloss/dβ and dloss/dσ of the surrogate against central differences of what the shader draws: 2 %.
+    """dloss/dβ and dloss/dσ of the surrogate match central differences of the rendered image to 2 %.
 
-    Steps of 1 % of each parameter: pairs on the kinks of the clamp make the loss not quite smooth.
+    The steps are 1 % of each parameter. Pairs at the kinks of the clamp make the loss not quite smooth.
     """
     drawn = drawn_by_the_runtime(gl_context, "spot", PLANTED).captured
     valid = drawn.valid
@@ -83,7 +83,7 @@ def test_gradients_against_differences_of_the_drawn_image(gl_context):
 
 
 def test_the_small_problem_is_the_whole_one():
-    """The residuals' sum of squares is the loss of the pairs themselves: to 1e-3, what the grid leaves."""
+    """The sum of the squared residuals is the loss over all pairs, to 1e-3, the error of the grid."""
     random = np.random.default_rng(3)
     receivers, vpls = _pairs(random)
     overlap = jnp.asarray(10.0 ** random.uniform(-5.0, 0.5, (64, 32)) * random.choice([-1, 1], (64, 32)))

@@ -1,1 +1,1 @@
-"""Job three: a library of scenes in, a record and a tuned config for each out."""
+"""Fit a whole library of scenes, on one machine or a cluster. Each scene gets a record and a tuned config."""

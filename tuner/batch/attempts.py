@@ -1,4 +1,4 @@
-"""All attempts at one scene: until it has a record, or is set aside with the reason of the last."""
+"""Retry one scene until it has a record, or record it as failed with the reason of the last attempt."""
 
 import threading
 from collections.abc import Callable
@@ -10,14 +10,15 @@ from vpltune.tuner.batch.supervised_process import Limits, SupervisedProcess
 from vpltune.tuner.batch.tune_one import set_aside
 
 MOST_PASSED = 2
-"""Attempts that may pass a limit: a scene too large or too slow twice is so again, and others would wait."""
+"""Attempts that may exceed a limit before the scene is given up. A choice: a scene that was too large or too
+slow twice would be so again, and other scenes would have to wait."""
 
 Report = Callable[[dict[str, Any]], None]
-"""Called with events: `{"event": "attempt_failed", …}`, `{"event": "stage", …}`."""
+"""Called with each event: `{"event": "attempt_failed", …}` or `{"event": "stage", …}`."""
 
 
 def tune_with_retries(process: SupervisedProcess, job: Job, limits: Limits, report: Report) -> Record | None:
-    """The record of `job`; None while another process is at work on it.
+    """Fit the scene of `job` and return its record; None if another process is working on it.
 
     Raises:
         MachineError: this machine cannot fit anything.
@@ -52,7 +53,7 @@ _of_this_thread = threading.local()
 
 
 def tune_in_own_process(job: Job, limits: Limits, threads: int, report: Report) -> Record | None:
-    """The same, with a process that belongs to the calling thread and serves its next scene too."""
+    """`tune_with_retries` in a process that belongs to the calling thread and is kept for its next scene."""
     process = getattr(_of_this_thread, "process", None)
     if process is None:
         process = _of_this_thread.process = SupervisedProcess(threads, threading.Event())

@@ -1,4 +1,4 @@
-"""A whole library: what is left to do is found on disk, handed to a scheduler, and summed up."""
+"""Run a batch: find the scenes without a record, hand them to a scheduler, and sum up the results."""
 
 import contextlib
 import os
@@ -24,38 +24,41 @@ from vpltune.tuner.reference.cache import remove_leftovers
 
 Event = dict[str, Any]
 Scheduler = Callable[[Sequence[Job]], Iterator[Event]]
-"""Tunes jobs, begun in their order, and yields what happens; every job ends with a `record` event."""
+"""Starts the jobs in the given order and yields events. Every job ends with a `record` event."""
 
 
 @runtime_checkable
 class Watcher(Protocol):
-    """Whoever shows a batch while it runs."""
+    """Displays a batch while it runs."""
 
-    def found(self, jobs: Sequence[Job], already_done: int) -> None: ...
+    def found(self, jobs: Sequence[Job], already_done: int) -> None:
+        """Called once before the batch starts: the jobs to run, and how many scenes have a record already."""
 
-    def happened(self, event: Event) -> None: ...
+    def happened(self, event: Event) -> None:
+        """Called with each event of the scheduler."""
 
 
 @dataclass(frozen=True)
 class Library:
-    """The scenes of a library as jobs, one for each content."""
+    """The scenes of a library as jobs. Scenes with identical content share one job."""
 
     jobs: tuple[Job, ...]
     copies: dict[str, str]
-    """Name of each scene that has the same content as another, to that other's name."""
+    """Maps the name of each duplicate scene to the name of the scene that it duplicates."""
 
 
 @dataclass(frozen=True)
 class BatchResult:
-    """What became of every scene."""
+    """The results of a batch."""
 
     records: tuple[Record, ...]
     copies: dict[str, str]
+    """Duplicate scenes, see `Library.copies`."""
     fitted: int
-    """How many records this run made."""
+    """Number of scenes that this run had to tune."""
 
     def count(self, status: str) -> int:
-        """How many scenes ended as `status`."""
+        """Number of records with this status."""
         return sum(record.status == status for record in self.records)
 
 
@@ -72,6 +75,16 @@ def run_batch(
 ) -> BatchResult:
     """Tune every scene of `library` that has no record in `folder` yet.
 
+    Args:
+        library: A folder, or a text file that lists scenes.
+        folder: Output folder; created if needed.
+        options: Options of every fit.
+        scheduler: Runs the jobs, see `Scheduler`.
+        watcher: Displays the progress.
+        retry_failed: Whether to try failed scenes again.
+        tensorboard: Whether to write TensorBoard logs.
+        command: The command line, for the record.
+
     Raises:
         InputError: the library cannot be read or has no scene, or the folder cannot be written to.
         MachineError: this machine cannot fit anything.
@@ -81,7 +94,7 @@ def run_batch(
         raise InputError(f"{folder}: the output must be a folder, and is a file")
     scenes = library_scenes(library, leave_out=folder)
     folder.mkdir(parents=True, exist_ok=True)
-    # Two runs on one folder share the scenes out; one of them keeps the listing.
+    # Two runs on one folder share the scenes. Only one of them writes the listing.
     with claimed(folder / "claims" / "listing") as mine:
         found = jobs_of(scenes, folder, options, command, keep=mine)
         if mine:
@@ -104,9 +117,12 @@ def run_batch(
 def jobs_of(
     scenes: dict[str, Path], folder: Path, options: JobOptions, command: str | None = None, *, keep: bool
 ) -> Library:
-    """A job for each content among `scenes`, in their order; `keep`: whether digests are kept in `folder`."""
+    """One job for each distinct content among `scenes`, in their order.
+
+    `keep` says whether to save the digests of the files in `folder`.
+    """
     inputs, jobs, copies = SceneInputs(folder), {}, {}
-    # Hashing lets go of Python's lock: a library of many gigabytes is read by every core.
+    # Hashing releases the GIL, so threads hash a large library on every core.
     with ThreadPoolExecutor(os.cpu_count()) as readers:
         digests = list(readers.map(inputs.digest, scenes.values()))
     for (name, path), (digest, size) in zip(scenes.items(), digests, strict=True):
@@ -121,12 +137,12 @@ def jobs_of(
 
 
 def longest_first(jobs: Sequence[Job]) -> list[Job]:
-    """The largest scenes first: begun last, a long one would keep one worker busy and the others idle."""
+    """Jobs by descending input size. A long scene started last would leave all other workers idle."""
     return sorted(jobs, key=lambda job: -job.input_bytes)
 
 
 def forget_failed(records: Records, jobs: Sequence[Job]) -> None:
-    """Remove the records of scenes that failed, so that they are tried again."""
+    """Remove the records of failed scenes among `jobs`, so that these are tried again."""
     for key in records.known_keys() & {job.key for job in jobs}:
         record = records.read(key)
         if record is not None and record.status == "failed":
@@ -134,7 +150,7 @@ def forget_failed(records: Records, jobs: Sequence[Job]) -> None:
 
 
 def _keep_listing(folder: Path, library: Path, found: Library) -> None:
-    """Write which scene has which record: records of earlier contents and options lie beside these."""
+    """Write which record belongs to which scene: the folder keeps records of older contents and options."""
     names = {job.name: job.key for job in found.jobs}
     for leftover in folder.glob(".*.json"):
         leftover.unlink()

@@ -1,4 +1,4 @@
-"""The log of every run of a batch: one JSON object a line, for `pandas.read_json(path, lines=True)`."""
+"""The log of a batch: one JSON object per line. Read it with `pandas.read_json(path, lines=True)`."""
 
 import datetime
 import fcntl
@@ -11,11 +11,11 @@ from typing import Any
 from vpltune.renderer.files.strict_json import strict_json
 
 TAIL_BYTES = 1 << 16
-"""Longer than any line."""
+"""Bytes read from the end of the log to find its last whole line. A choice: longer than any line."""
 
 
 class BatchLog:
-    """Appends to a log; a line is there whole or not at all, and runs at once do not mix theirs."""
+    """Appends whole lines to a log file. Several runs may append to the same file at once."""
 
     def __init__(self, path: Path) -> None:
         self._handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o644)
@@ -29,7 +29,7 @@ class BatchLog:
         os.close(self._handle)
 
     def write(self, event: Mapping[str, Any]) -> None:
-        """Append `event` with the time in front of it."""
+        """Append `event`, preceded by the current time (ISO 8601, UTC)."""
         now = datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
         line = strict_json({"time": now, **event}, indent=None).encode() + b"\n"
         fcntl.flock(self._handle, fcntl.LOCK_EX)
@@ -40,7 +40,7 @@ class BatchLog:
             fcntl.flock(self._handle, fcntl.LOCK_UN)
 
     def _drop_torn_line(self) -> None:
-        """Take away what a killed process wrote of its last line."""
+        """Truncate the partial last line that a killed process left."""
         size = os.fstat(self._handle).st_size
         if size == 0 or os.pread(self._handle, 1, size - 1) == b"\n":
             return

@@ -1,8 +1,8 @@
-"""Who is at work on a scene: a file held by one process at a time, and free again when that process dies.
+"""A claim on a scene: a file that one process holds at a time, and that is free again when the process dies.
 
-On one machine the kernel's lock on the file says whether its holder lives, and ends with it. Between
-machines whose file system does not carry locks, the holder's host in the file and a heartbeat (the file's
-time of change) say it: a claim of another host counts until its heart has not beaten for `STALE_SECONDS`.
+On one machine the holder locks the file, and the kernel releases the lock when the holder ends. Some network
+file systems have no locks. For these, the file names the holder's host, and a heartbeat updates its
+modification time. A claim by another host is valid until its heartbeat is `STALE_SECONDS` old.
 """
 
 import contextlib
@@ -17,15 +17,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 HEARTBEAT_SECONDS = 15.0
+"""Interval between two heartbeats. A choice."""
 STALE_SECONDS = 120.0
-"""Of another host's silence: eight missed beats, or a file server that was away for two minutes."""
+"""Age of the last heartbeat at which another host's claim lapses. A choice: eight missed beats, so a file
+server may be unreachable for up to two minutes."""
 
 
 @contextlib.contextmanager
 def claimed(path: Path) -> Iterator[bool]:
-    """Hold `path` alone; yields False at once where another process does.
+    """Claim `path`. Yields True, or at once False if another process holds the claim.
 
-    The file is gone afterwards, unless the process is killed: then it lies there, free, for the next.
+    The file is deleted afterwards. If the process is killed, the file remains but can be claimed by the next.
     """
     handle = _taken(path)
     if handle is None:
@@ -39,7 +41,7 @@ def claimed(path: Path) -> Iterator[bool]:
     finally:
         stopped.set()
         heart.join()
-        # Unlinked while held: whoever opened it before finds it gone once the lock is theirs.
+        # Unlink while holding the lock: a process that has already opened the file then finds it gone.
         path.unlink(missing_ok=True)
         os.close(handle)
 
@@ -70,13 +72,13 @@ def _locked(handle: int) -> bool:
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
-        # Some network file systems cannot lock at all; the heartbeat alone speaks there.
+        # Some network file systems have no locks; only the heartbeat counts there.
         return error.errno not in (errno.EWOULDBLOCK, errno.EACCES)
     return True
 
 
 def _held_elsewhere(handle: int) -> bool:
-    """Whether a process of another host wrote the claim and may yet live."""
+    """Whether another host wrote the claim and its heartbeat is recent."""
     try:
         host = json.loads(os.pread(handle, 4096, 0))["host"]
     except (ValueError, KeyError, TypeError):

@@ -1,7 +1,7 @@
-"""The scheduler of a cluster with Dask: its workers fit, each scene in a supervised process of their own.
+"""Scheduler for a Dask cluster. Each Dask worker fits scenes in a supervised process of its own.
 
-Dask keeps nothing that counts. A worker that dies has its scene given to another; a scheduler that dies is
-waited for, and gets every scene again that has no record yet.
+All results are on disk, none in Dask. If a worker dies, another worker gets its scene. If the Dask scheduler
+dies, the batch waits for it to return and submits every scene without a record again.
 """
 
 import itertools
@@ -13,6 +13,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import distributed
+
 from vpltune.renderer.errors import MachineError
 from vpltune.tuner.batch.attempts import tune_in_own_process
 from vpltune.tuner.batch.job import Job
@@ -20,24 +22,23 @@ from vpltune.tuner.batch.record import Records
 from vpltune.tuner.batch.supervised_process import Limits
 from vpltune.tuner.batch.tune_one import set_aside
 
-try:
-    import distributed
-except ModuleNotFoundError as error:
-    raise MachineError("--scheduler: Dask is not installed; try: pip install 'vpltune[cluster]'") from error
-
 CONNECT_SECONDS = 120.0
-"""For a scheduler to answer, at the start and after it was lost."""
+"""Time for the Dask scheduler to answer, at the start and after a lost connection. A choice."""
 POLL_SECONDS = 0.2
+"""Interval between two checks of the submitted tasks, and pause before a scene that another run has claimed
+is tried again. A choice."""
 CREW_SECONDS = 5.0
-"""Between two looks at how many workers there are."""
+"""Interval between two queries of the number of workers. A choice."""
 MOST_AT_ONCE = 4096
-"""Scenes handed to Dask at a time: enough for any cluster, and soon handed out again."""
+"""Scenes submitted to Dask at a time. A choice: enough for any cluster, and quickly submitted again."""
 
 Event = dict[str, Any]
 
 
 def tune_on_dask(jobs: Sequence[Job], address: str, threads: int, limits: Limits) -> Iterator[Event]:
-    """Tune `jobs`, begun about in their order, on the workers of the scheduler at `address`.
+    """Tune `jobs`, roughly in the given order, on the workers of the Dask scheduler at `address`.
+
+    Yields events; every job ends with a `record` event.
 
     Raises:
         MachineError: no scheduler answers, or a worker cannot fit anything.
@@ -59,7 +60,7 @@ def _tune_with(
     threads: int,
     limits: Limits,
 ) -> Iterator[Event]:
-    """Until all is done, or the scheduler is lost: then what was in its hands is waiting again."""
+    """Tune until all jobs are done or the connection is lost. Unfinished jobs then go back into `waiting`."""
     flying: dict[distributed.Future, tuple[int, Job]] = {}
     run, serial, crew = uuid.uuid4().hex[:8], itertools.count(), _Crew(client)
     try:
@@ -94,7 +95,7 @@ def _tune_with(
 
 
 class _Crew:
-    """How many scenes the cluster does at a time, asked for now and then."""
+    """The number of scenes that the cluster can fit at a time, queried every `CREW_SECONDS`."""
 
     def __init__(self, client: "distributed.Client") -> None:
         self._client = client
@@ -102,7 +103,7 @@ class _Crew:
         self._count = 0
 
     def changes(self) -> Iterator[Event]:
-        """A `workers` event where the number has changed."""
+        """Yields a `workers` event if the number has changed."""
         now = time.monotonic()
         if now - self._asked < CREW_SECONDS:
             return
@@ -110,42 +111,52 @@ class _Crew:
         try:
             count = sum(self._client.nthreads().values())
         except (OSError, TimeoutError):
-            return  # the scheduler is being lost
+            return  # the connection is about to be lost
         if count != self._count:
             self._count = count
             yield {"event": "workers", "count": count}
 
 
 def _events_of(future: "distributed.Future", job: Job, deaths: dict[str, int], limits: Limits) -> list[Event]:
-    """What a task that ended has to tell; nothing where it is to be handed out again."""
+    """The events of a task that ended, without a `record` event if the job has to be submitted again."""
     if future.status not in ("finished", "error"):
-        return []  # lost with the scheduler, or cancelled by it
+        return []  # the connection was lost, or the scheduler cancelled the task
     record = Records(Path(job.folder)).read(job.key)
     if record is not None and record.attempts == 1:
-        # All that there is to tell, without asking a worker: a thousand of them finish hundreds a second.
+        # There was no failed attempt, so the record on disk says everything. Reading it avoids a request to
+        # the worker: a thousand workers finish hundreds of scenes a second.
         return [{"event": "record", **asdict(record)}]
     try:
         return future.result(timeout=10.0)
     except MachineError:
         raise
     except distributed.KilledWorker as error:
-        # The scene itself runs in a process apart; still, it may be what brings whole workers down.
+        # The scene runs in a separate process but may still be what kills the workers.
         deaths[job.key] = deaths.get(job.key, 0) + 1
-        reason = f"the Dask workers that had it died ({error})"
+        reason = f"the Dask workers that ran it died ({error})"
         if deaths[job.key] <= limits.retries:
             return [_failed_attempt(job, deaths[job.key], reason)]
         record = set_aside(job, reason, deaths[job.key], 0.0)
         return [] if record is None else [{"event": "record", **asdict(record)}]
-    except (TimeoutError, OSError):  # its worker died as it was to hand the answer over
+    except (TimeoutError, OSError):  # the worker died before it could send the result
         return []
     except Exception as error:
         if isinstance(error, distributed.CancelledError):
             return []
-        raise MachineError(f"a Dask worker cannot fit: {type(error).__name__}: {error}") from error
+        raise MachineError(f"a Dask worker failed: {type(error).__name__}: {error}") from error
 
 
 def tune_as_task(job: str, threads: int, limits: dict[str, Any]) -> list[Event]:
-    """What a Dask worker runs: all attempts at a scene; no `record` event where another process has it."""
+    """The task of a Dask worker: all attempts at one scene.
+
+    Args:
+        job: The job as JSON, see `Job.to_json`.
+        threads: Threads for each library of the fit.
+        limits: The fields of a `Limits`.
+
+    Returns:
+        The events, without a `record` event if another process is working on the scene.
+    """
     events: list[Event] = []
     record = tune_in_own_process(
         Job.from_json(job),
@@ -170,10 +181,10 @@ def _connected(address: str) -> "distributed.Client":
         try:
             return distributed.Client(address, timeout=5.0, set_as_default=False, name="vpltune-batch")
         except ValueError as error:
-            raise MachineError(f"--scheduler: {address!r:.100} is no address ({error})") from error
+            raise MachineError(f"--scheduler: must be an address, got {address!r:.100} ({error})") from error
         except (OSError, TimeoutError) as error:
             if time.monotonic() > deadline:
                 raise MachineError(
-                    f"--scheduler: no Dask scheduler answers at {address} ({error}); what is done is kept"
+                    f"--scheduler: no Dask scheduler answers at {address} ({error}); finished scenes are kept"
                 ) from error
             time.sleep(1.0)

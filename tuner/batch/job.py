@@ -1,4 +1,4 @@
-"""One scene to be tuned, as it travels to whatever process does it."""
+"""One scene to tune, in a form that can be sent to another process."""
 
 import dataclasses
 import json
@@ -14,32 +14,37 @@ if TYPE_CHECKING:
     from vpltune.tuner.scene_fit.fit_scene import FitOptions
 
 LONGEST_STEM = 60
+"""Characters of the scene's file name in the name of its output folder. A choice."""
 
 
 def short_key(key: str) -> str:
-    """Enough of a key to tell scenes apart: among 100,000 of one name, eight digits would clash once."""
+    """The first 12 hex digits of a key. With eight, about one pair among 100,000 scenes would clash."""
     return key[:12]
 
 
 def claim_path(folder: Path, key: str) -> Path:
-    """The file that whoever works on the scene of `key` holds."""
+    """Path of the claim on the scene of `key`, see `tuner.batch.claim`."""
     return folder / "claims" / short_key(key)
 
 
 @dataclass(frozen=True)
 class JobOptions:
-    """What every scene of a batch is fitted with: `vpltune fit`'s own options."""
+    """Options of every fit in a batch, with the meaning that they have in `vpltune fit`."""
 
     start: str
-    """Where the fit starts: the text of a config file."""
+    """Start of the fit: the text of a config file."""
     views: int = 4
     seed: int = 0
     bounces: str = "1"
     size: tuple[int, int] | None = None
-    """Width and height of the views in pixels; None leaves it to the fit."""
+    """Width and height of the views in pixels; None for the default of a fit."""
 
     def fit_options(self, command: str | None) -> "FitOptions":
-        """The same, as `fit_scene` takes them; `command` is what was typed."""
+        """The options as `fit_scene` takes them. `command` is the command line, for the record.
+
+        Raises:
+            InputError: `start` is not a valid config.
+        """
         from vpltune.renderer.config.tuned_config import parse_config
         from vpltune.tuner.scene_fit.fit_scene import FitOptions
 
@@ -52,24 +57,25 @@ class JobOptions:
 
 @dataclass(frozen=True)
 class Job:
-    """A scene, the folder of its batch, and how it is fitted."""
+    """A scene, the folder of its batch, and the options of its fit."""
 
     key: str
+    """Hash of everything that the fit depends on, see `tuner.batch.job_key`."""
     scene: str
-    """Absolute path."""
+    """Absolute path of the scene file."""
     name: str
-    """As the library names it."""
+    """Name of the scene in the library."""
     folder: str
-    """The batch's folder, an absolute path."""
+    """Absolute path of the batch folder."""
     options: JobOptions
     input_bytes: int = 0
-    """Of the scene and all it refers to: the first guess of how long it takes."""
+    """Size of the scene and all files that it refers to. The time of the fit is estimated from it."""
     command: str | None = None
-    """What was typed, for the record."""
+    """The command line, for the record."""
 
     @property
     def output_name(self) -> str:
-        """The scene's output folder, relative to the batch's."""
+        """The scene's output folder, relative to the batch folder."""
         stem = re.sub(r"[^A-Za-z0-9._-]+", "_", Path(self.scene).stem).lstrip(".")[:LONGEST_STEM]
         return f"scenes/{stem or 'scene'}-{short_key(self.key)}"
 
@@ -80,14 +86,16 @@ class Job:
 
     @property
     def claim(self) -> Path:
-        """The file that whoever works on this scene holds."""
+        """Path of the claim on this scene."""
         return claim_path(Path(self.folder), self.key)
 
     def to_json(self) -> str:
+        """The job as one JSON object."""
         return json.dumps(dataclasses.asdict(self))
 
     @classmethod
     def from_json(cls, text: str) -> "Job":
+        """The job that `to_json` wrote."""
         document = json.loads(text)
         options = document.pop("options")
         size = options.pop("size")
@@ -95,7 +103,7 @@ class Job:
 
 
 def write_jobs(path: Path, jobs: Sequence[Job]) -> None:
-    """Write jobs of one batch to a file, what they have in common once."""
+    """Write the jobs of one batch, at least one, to a file. Fields that they share are written once."""
     common = json.loads(jobs[0].to_json())
     document = {name: common[name] for name in ("folder", "options", "command")}
     document["jobs"] = [[job.key, job.scene, job.name, job.input_bytes] for job in jobs]
@@ -103,7 +111,7 @@ def write_jobs(path: Path, jobs: Sequence[Job]) -> None:
 
 
 def read_jobs(path: Path) -> list[Job]:
-    """The jobs of a file that `write_jobs` wrote."""
+    """Read the jobs from a file that `write_jobs` wrote."""
     document = json.loads(path.read_text(encoding="utf-8"))
     names = ("key", "scene", "name", "input_bytes")
     common = {name: document[name] for name in ("folder", "options", "command")}

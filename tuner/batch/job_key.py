@@ -1,8 +1,7 @@
-"""The key of a scene's record: a hash of every byte that its fit depends on.
+"""The key of a scene's record: a hash of everything that its fit depends on.
 
-Files are hashed once: what was found is kept in `inputs.json` in the batch folder, and holds as long as
-size and times of change of every file are as they were. That file is a help and no truth: without it,
-everything is hashed again.
+The hash of each file is cached in `inputs.json` in the batch folder. It is valid as long as the size and the
+timestamps of the file stay the same. Without `inputs.json`, all files are hashed again.
 """
 
 import contextlib
@@ -23,16 +22,17 @@ from vpltune.tuner.batch.job import JobOptions
 from vpltune.tuner.batch.referred_files import referred_files
 
 KEY_VERSION = 2
-"""Raise when a record of the same inputs would say something else: old records are then passed over."""
+"""Increase it whenever a code change alters the record of the same inputs. Old records are then ignored."""
 SETTLED_SECONDS = 2.0
-"""A file changed so shortly before it was hashed could change again within one tick of its clock."""
+"""A digest is not cached if the file changed less than this before it was hashed: within the same tick of the
+clock it could change again without a new timestamp. A choice."""
 
 Stamp = list[int] | None
-"""Size, and times of change of content and of anything, in ns; None for what is not there."""
+"""Size in bytes, mtime and ctime in ns; None for a missing file."""
 
 
 class SceneInputs:
-    """Digests of scenes and of all that they refer to."""
+    """Digests of scenes and the files that they refer to, cached in the batch folder."""
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / "inputs.json"
@@ -43,7 +43,7 @@ class SceneInputs:
             self._known = known if isinstance(known, dict) else {}
 
     def digest(self, scene: Path) -> tuple[str, int]:
-        """Hash of the scene's file, its sidecar and what it refers to; and how many bytes these are."""
+        """Hex SHA-256 of the scene file, its sidecar and the files it refers to; and their size in bytes."""
         entries = self._known.get(str(scene))
         if entries is None or any(_stamp(Path(path)) != stamp for path, stamp, _ in entries):
             entries = self._hashed(scene)
@@ -52,13 +52,18 @@ class SceneInputs:
         return hashlib.sha256(text.encode()).hexdigest(), sum(stamp[0] for _, stamp, _ in entries if stamp)
 
     def save(self) -> None:
-        """Keep what was found; a folder that cannot be written to shows itself soon enough."""
+        """Write the new digests to `inputs.json`.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
         if self._new:
             write_text_whole(self._path, json.dumps(self._known) + "\n")
             self._new = False
 
     def _hashed(self, scene: Path) -> list[list[Any]]:
-        # As `renderer.scene.placement` names it, which takes half a second to import.
+        # The name is that of `renderer.scene.placement`, which is not imported because that takes half a
+        # second.
         sidecar = scene.with_suffix(".vpltune.toml")
         began = time.time_ns()
         entries = []
@@ -73,7 +78,11 @@ class SceneInputs:
 
 
 def job_key(content_digest: str, options: JobOptions) -> str:
-    """Hash of a scene's content, the options of its fit and the versions of what fits it."""
+    """Hex SHA-256 of a scene's content, the options of its fit, and the versions of vpltune, JAX and Mitsuba.
+
+    Raises:
+        InputError: `options.start` is not a valid config.
+    """
     return hashlib.sha256(f"{content_digest} {_settings(options)}".encode()).hexdigest()
 
 
@@ -93,7 +102,7 @@ def _stamp(path: Path) -> Stamp:
         found = path.stat()
     except OSError:
         return None
-    # Devices and pipes are no scenes, and are never opened.
+    # Devices and pipes are not scenes and must never be opened.
     regular = stat.S_ISREG(found.st_mode)
     return [found.st_size, found.st_mtime_ns, found.st_ctime_ns] if regular else None
 

@@ -1,4 +1,4 @@
-"""The scheduler of one machine: a few tuning processes, each looked after by a thread."""
+"""Scheduler for one machine: a few tuning processes, each supervised by a thread."""
 
 import queue
 import threading
@@ -11,15 +11,21 @@ from vpltune.tuner.batch.job import Job
 from vpltune.tuner.batch.supervised_process import Limits, StoppedError, SupervisedProcess
 
 BUSY_SECONDS = 1.0
-"""Until a scene that another run is working on is looked at again."""
+"""Pause before a scene that another run is working on is tried again. A choice."""
 
 Event = dict[str, Any]
 
 
 def tune_locally(jobs: Sequence[Job], workers: int, threads: int, limits: Limits) -> Iterator[Event]:
-    """Tune `jobs`, begun in their order, and yield what happens: every job ends with a `record` event.
+    """Tune `jobs`, started in the given order, and yield events. Every job ends with a `record` event.
 
-    Left early, by an exception or by closing the iterator, it ends every process that it started.
+    If the iterator is closed early or raises, every process that it started is ended.
+
+    Args:
+        jobs: What to tune.
+        workers: Scenes to fit at a time.
+        threads: Threads for each library of a fit.
+        limits: Limits of each attempt.
 
     Raises:
         MachineError: this machine cannot fit anything.
@@ -70,7 +76,7 @@ def _serve(
                 events.put({"event": "record", **asdict(record)})
     except StoppedError:
         pass
-    # Whatever it is, the batch ends with it, in the thread that can tell the user.
+    # Any other error ends the batch. Pass it to the main thread, which can tell the user.
     except BaseException as error:
         events.put(error)
     finally:

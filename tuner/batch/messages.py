@@ -1,4 +1,4 @@
-"""What the tuning process and its parent say to each other: one JSON object a message."""
+"""Messages between the tuning process and its parent, one JSON object each."""
 
 import json
 from multiprocessing.connection import Connection
@@ -6,13 +6,18 @@ from typing import Any
 
 
 def send(connection: Connection, message: dict[str, Any]) -> None:
+    """Send `message`.
+
+    Raises:
+        OSError: the other end is closed.
+    """
     connection.send_bytes(json.dumps(message).encode())
 
 
 def receive(connection: Connection) -> dict[str, Any]:
-    """The next message; waits for it.
+    """Wait for the next message and return it.
 
     Raises:
-        EOFError, OSError: the other side is gone.
+        EOFError, OSError: the other end is closed.
     """
     return json.loads(connection.recv_bytes())

@@ -1,4 +1,4 @@
-"""What became of a scene: one file each, the truth about a library. Whoever schedules keeps nothing."""
+"""The result of each scene, one file each. The state of a batch is in these files; schedulers keep none."""
 
 import json
 import os
@@ -13,58 +13,59 @@ from vpltune.renderer.files.strict_json import strict_json
 Status = Literal["done", "unlit", "failed", "refused"]
 
 SUFFIX = ".json"
+"""File name extension of a record."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """The end of one scene's work. While a scene has none, it is still to be done."""
+    """The result of one scene. A scene without a record still has to be tuned."""
 
     key: str
     """Hash of everything that the fit depends on, see `tuner.batch.job_key`."""
     scene: str
-    """The scene file, an absolute path."""
+    """Absolute path of the scene file."""
     name: str
-    """The scene file as the library names it: relative to its folder."""
+    """Name of the scene in the library, relative to the library's folder."""
     status: Status
-    """`done`: fitted, whether or not that was better than the start, see `fit`. `unlit`: no indirect light
-    reaches its views, so the start is kept. `refused`: the file cannot be used, whatever is tried.
-    `failed`: every attempt failed."""
+    """`done`: fitted, whether or not the result beats the start; see `fit`. `unlit`: no indirect light
+    reaches the views, so the start is kept. `refused`: the scene file cannot be used, and a retry would not
+    help. `failed`: every attempt failed."""
     reason: str
-    """How the fit ended, or why there is none; one line."""
+    """Outcome of the fit, or why there is none; one line."""
     seconds: float
-    """Wall time of the attempt that ended it."""
+    """Wall time of the last attempt."""
     attempts: int
     output: str
-    """Folder of tuned.json, images and metrics, relative to the batch's own; empty where none was made."""
+    """Folder of tuned.json, images and metrics, relative to the batch folder; empty if there is none."""
     host: str
     finished: str
-    """When: ISO 8601, in UTC."""
+    """End of the last attempt, ISO 8601 in UTC."""
     peak_memory_bytes: int = 0
-    """Most memory that the process had up to then; 0 where it is not known."""
+    """Peak memory of the process until then; 0 if unknown."""
     stages: dict[str, float] = field(default_factory=dict)
-    """Seconds of each stage of the fit."""
+    """Seconds that each stage of the fit took."""
     fit: str = ""
-    """How a fit that was made ended: `tuner.fitting.fit_status.Outcome`; empty where there is none."""
+    """Outcome of the fit, `tuner.fitting.fit_status.Outcome`; empty if there was no fit."""
 
 
 class Records:
-    """The records of one batch folder, in its folder `records`."""
+    """The records of one batch, in the subfolder `records` of its folder."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder / "records"
 
     def known_keys(self) -> set[str]:
-        """Keys of all records, by one look at the folder: no file is opened."""
+        """Keys of all records, from the file names alone."""
         return {name.removesuffix(SUFFIX) for name in self._names() if not name.startswith(".")}
 
     def unfinished_files(self) -> Iterator[tuple[str, Path]]:
-        """Key and path of every temporary file that a killed process left."""
+        """Key and path of each temporary file that a killed process left."""
         for name in self._names():
             if name.startswith("."):
                 yield name[1:].partition("-")[0], self._folder / name
 
     def read(self, key: str) -> Record | None:
-        """The record of `key`; None where there is none, or what is there is no record."""
+        """The record of `key`, or None if it is missing or damaged."""
         try:
             document = json.loads(self.path(key).read_text(encoding="utf-8"))
             return Record(**{name: document[name] for name in _NAMES})
@@ -72,15 +73,19 @@ class Records:
             return None
 
     def write(self, record: Record) -> None:
-        """Keep `record`, whole or not at all."""
+        """Write `record` atomically.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
         write_text_whole(self.path(record.key), strict_json(asdict(record)) + "\n")
 
     def remove(self, key: str) -> None:
-        """Forget what became of `key`, so that it is done again."""
+        """Delete the record of `key`, if there is one, so that its scene is tuned again."""
         self.path(key).unlink(missing_ok=True)
 
     def path(self, key: str) -> Path:
-        """Where the record of `key` lies, whether or not it exists."""
+        """Path of the record of `key`, whether or not it exists."""
         return self._folder / f"{key}{SUFFIX}"
 
     def _names(self) -> list[str]:
@@ -95,5 +100,5 @@ _NAMES = tuple(item.name for item in fields(Record))
 
 
 def as_document(record: Record) -> dict[str, Any]:
-    """The record as its file and `vpltune batch --json` have it."""
+    """The record as JSON values, as in its file and in `vpltune batch --json`."""
     return asdict(record)

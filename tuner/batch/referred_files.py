@@ -1,7 +1,7 @@
-"""Which files a scene file may refer to: a quick look at its text, not a reader.
+"""List the files that a scene file may refer to, by a quick scan of its text instead of a full parse.
 
-It names rather too many than too few: a file too many only means that a scene is fitted again when that
-file changes. Names that lead out of the scene's folder are left out, as the readers refuse them.
+The list errs on the side of too many files: an extra one only means that a change to it triggers another fit.
+Paths that leave the scene's folder are left out, since the readers reject them.
 """
 
 import json
@@ -15,19 +15,22 @@ from pathlib import Path
 from vpltune.renderer.scene.files.limits import MAX_FILE_BYTES
 
 READ_SUFFIXES = (".gltf", ".glb", ".obj", ".ply")
-"""Of the scenes that can be read."""
+"""Extensions of the scene files that `read_scene` reads."""
 MITSUBA_SUFFIX = ".xml"
+"""Extension of a Mitsuba scene."""
 
+# Magic, version, file length, length and type of the JSON chunk (glTF 2.0, section 4.4).
 _GLB_HEADER = struct.Struct("<4sIIII")
+# Attributes and lines that name a file.
 _XML_VALUE = re.compile(rb'value\s*=\s*"([^"]+\.[A-Za-z0-9]{2,4})"')
 _MTLLIB = re.compile(rb"^[ \t]*mtllib[ \t]+([^\r\n]+)", re.MULTILINE)
 _MAP = re.compile(rb"^[ \t]*map_Kd[ \t]+([^\r\n]+)", re.MULTILINE | re.IGNORECASE)
 _TEXTURE_FILE = re.compile(rb"^comment[ \t]+TextureFile[ \t]+([^\r\n]+)", re.MULTILINE)
-_PLY_HEADER_BYTES = 1 << 16
+_PLY_HEADER_BYTES = 1 << 16  # a choice: far more than a usual header
 
 
 def referred_files(scene: Path) -> tuple[Path, ...]:
-    """Files that `scene` names, each once, in the order they are named; some may not exist."""
+    """Paths of the files that `scene` names, each once, in the order of the file. Some may not exist."""
     found = dict.fromkeys(
         path for name in _names(scene) if (path := _inside(scene.parent, name)) is not None and path != scene
     )
@@ -35,7 +38,7 @@ def referred_files(scene: Path) -> tuple[Path, ...]:
 
 
 def is_mitsuba_scene(path: Path) -> bool:
-    """Whether an XML file is a Mitsuba scene, from its beginning."""
+    """Whether an XML file is a Mitsuba scene, judged by its first 4096 bytes."""
     return re.search(rb"<scene\b", _content(path, 4096)) is not None
 
 
@@ -56,7 +59,7 @@ def _names(scene: Path) -> Iterator[str]:
 
 
 def _glb_json(scene: Path) -> bytes:
-    """The JSON chunk alone: the rest of a .glb may be large."""
+    """The JSON chunk of a .glb file, without reading the rest, which may be large."""
     head = _content(scene, _GLB_HEADER.size)
     if len(head) < _GLB_HEADER.size:
         return b""
@@ -82,7 +85,7 @@ def _gltf_uris(content: bytes) -> Iterator[str]:
 
 def _obj_names(scene: Path) -> Iterator[str]:
     for line in _MTLLIB.findall(_content(scene)):
-        # One name that may hold spaces, or several.
+        # The line holds one name that may contain spaces, or several names.
         for name in (line, *line.split()):
             library = _inside(scene.parent, text := name.decode("utf-8", "replace").strip())
             if library is None:
@@ -93,7 +96,7 @@ def _obj_names(scene: Path) -> Iterator[str]:
 
 
 def _tails(line: bytes) -> Iterator[str]:
-    """The line from each of its words on: options stand before a name, and a name may hold spaces."""
+    """Every tail of the line that starts at a word: options precede the name, which may contain spaces."""
     text = line.decode("utf-8", "replace").strip()
     for word in re.finditer(r"\S+", text):
         yield text[word.start() :]
@@ -109,7 +112,7 @@ def _inside(folder: Path, name: str) -> Path | None:
 
 
 def _content(path: Path, limit: int = MAX_FILE_BYTES) -> bytes:
-    """The first bytes of a regular file; nothing where there is none."""
+    """The first `limit` bytes of a regular file; empty for anything else."""
     try:
         if not stat.S_ISREG(path.stat().st_mode):
             return b""

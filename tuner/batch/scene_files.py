@@ -1,4 +1,4 @@
-"""The scenes of a library: everything below a folder, or what a list names."""
+"""Find the scenes of a library: all scene files below a folder, or those named in a list."""
 
 import os
 from collections.abc import Iterator
@@ -8,13 +8,14 @@ from vpltune.renderer.errors import InputError
 from vpltune.tuner.batch.referred_files import MITSUBA_SUFFIX, READ_SUFFIXES, is_mitsuba_scene, referred_files
 
 LONGEST_LIST_BYTES = 1 << 28
+"""Largest list file that is read. A choice: room for millions of scenes."""
 
 
 def library_scenes(library: Path, leave_out: Path) -> dict[str, Path]:
-    """Name and absolute path of every scene, in the order of names, or of the list.
+    """Map the name of every scene to its absolute path, sorted by path, or in the order of the list.
 
-    A file that a Mitsuba scene refers to is part of it, and no scene of its own. Folders and files
-    whose name begins with a dot, and the folder `leave_out`, are passed over.
+    A file that a Mitsuba scene refers to is part of that scene and not a scene itself. Files and folders
+    whose name begins with a dot are skipped, and so is the folder `leave_out`.
 
     Raises:
         InputError: the library cannot be read, or has no scene.
@@ -52,11 +53,13 @@ def _listed(library: Path) -> Iterator[str]:
         raise InputError(f"{library}: cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
         raise InputError(
-            f"{library}: a library is a folder, or a text file with a scene a line; not UTF-8 text "
+            f"{library}: must be a folder, or a text file with one scene per line; this is not UTF-8 text "
             f"(byte {error.start})"
         ) from error
     if len(content) > LONGEST_LIST_BYTES:
-        raise InputError(f"{library}: a list of scenes is at most {LONGEST_LIST_BYTES} bytes long")
+        raise InputError(
+            f"{library}: a list of scenes must be at most {LONGEST_LIST_BYTES} bytes long, this one is longer"
+        )
     for line in text.splitlines():
         name = line.strip()
         if name and not name.startswith("#"):

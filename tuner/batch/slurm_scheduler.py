@@ -1,7 +1,7 @@
-"""The scheduler of a cluster with Slurm, through submitit: an array of tasks that share out the scenes.
+"""Scheduler for a Slurm cluster, through submitit: an array of tasks shares the scenes.
 
-Nothing is asked of Slurm but to run the tasks: what is done is read from the records. A task that Slurm
-preempts is queued again and goes on; scenes of a task that died go into another array.
+Slurm only runs the tasks; progress is read from the records on disk. A preempted task is queued again and
+continues. Scenes of a task that died go into another array.
 """
 
 import sys
@@ -13,33 +13,39 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import submitit
+
 from vpltune.renderer.errors import InputError, MachineError
 from vpltune.tuner.batch.attempts import tune_with_retries
 from vpltune.tuner.batch.job import Job, read_jobs, write_jobs
 from vpltune.tuner.batch.record import Records
 from vpltune.tuner.batch.supervised_process import UNLIMITED_BYTES, Limits, SupervisedProcess
 
-try:
-    import submitit
-except ModuleNotFoundError as error:
-    raise MachineError("--slurm: submitit is not installed; try: pip install 'vpltune[cluster]'") from error
-
 POLL_SECONDS = 2.0
+"""Interval between two checks of the tasks and records. A choice."""
 ENDING_SECONDS = 10.0
-"""For tasks to end by themselves once all is done."""
+"""Time for the tasks to end by themselves once all scenes are done. A choice."""
 LEAST_MINUTES = 60
+"""Shortest time limit that is requested for a task if `timeout_min` is not given. A choice."""
 MOST_MINUTES = 24 * 60
-"""Asked of Slurm for a task where `timeout_min` is not given."""
+"""Longest time limit that is requested for a task if `timeout_min` is not given. A choice."""
 GUESSED_MINUTES = 1.0
-"""For a scene, in that."""
+"""Minutes per scene in that time limit. A choice."""
 
 Event = dict[str, Any]
 
 
 class TuneShare(submitit.helpers.Checkpointable):
-    """What a task runs: its share of the scenes one after another, then what others have not begun.
+    """One task: it tunes its own share of the scenes, then any scenes of other tasks without a record.
 
-    Called again after it was interrupted, it passes over what is done.
+    After an interruption it is called again and skips the scenes that have a record.
+
+    Args:
+        listing: File with all jobs, see `write_jobs`.
+        first: Index of the first job of this task's share.
+        step: Every `step`-th job from `first` on belongs to the share.
+        threads: Threads for each library of a fit.
+        limits: Limits of each attempt.
     """
 
     def __init__(self, listing: Path, first: int, step: int, threads: int, limits: Limits) -> None:
@@ -56,8 +62,8 @@ class TuneShare(submitit.helpers.Checkpointable):
             for job in jobs[self._first :: self._step]:
                 self._tune(process, job)
             known = Records(Path(jobs[0].folder)).known_keys()
-            # From its own place on, so that tasks that are done do not all look at the same scene; one that
-            # another task or run has is left to it.
+            # Start at this task's first job, so that tasks that run out of work do not all try the same
+            # scene. A scene that another task or run has claimed is skipped.
             for job in jobs[self._first :] + jobs[: self._first]:
                 if job.key not in known:
                     self._tune(process, job)
@@ -66,7 +72,7 @@ class TuneShare(submitit.helpers.Checkpointable):
 
     def _tune(self, process: SupervisedProcess, job: Job) -> None:
         def say(event: Event) -> None:
-            if event["event"] == "attempt_failed":  # into the task's own log
+            if event["event"] == "attempt_failed":  # goes to the log of the task
                 print(f"{event['name']}: attempt {event['attempt']}: {event['reason']}", file=sys.stderr)
 
         tune_with_retries(process, job, self._limits, say)
@@ -75,13 +81,20 @@ class TuneShare(submitit.helpers.Checkpointable):
 def tune_on_slurm(
     jobs: Sequence[Job], options: dict[str, Any], workers: int, threads: int, limits: Limits
 ) -> Iterator[Event]:
-    """Tune `jobs` in arrays of at most `workers` tasks; `options` go to submitit's executor.
+    """Tune `jobs` in arrays of at most `workers` tasks, and yield events.
 
-    Left early, it cancels every task.
+    Every job ends with a `record` event. If the iterator is closed early, every task is cancelled.
+
+    Args:
+        jobs: What to tune; at least one.
+        options: Parameters for submitit's executor.
+        workers: Tasks at a time.
+        threads: Threads for each library of a fit.
+        limits: Limits of each attempt.
 
     Raises:
-        InputError: submitit does not take the options.
-        MachineError: Slurm is not here, tasks cannot fit anything, or an array ended without a single record.
+        InputError: submitit rejects the options.
+        MachineError: Slurm was not found, no task can fit anything, or a whole array ended without a record.
     """
     folder = Path(jobs[0].folder)
     executor = _executor(folder / "slurm", options, workers, threads, limits, len(jobs))
@@ -103,7 +116,7 @@ def _one_array(
     threads: int,
     limits: Limits,
 ) -> Iterator[Event]:
-    # Dealt like cards, largest first: shares come out about even.
+    # Jobs are sorted by size and dealt like cards, so the shares are about even.
     jobs = list(left.values())
     count = min(workers, len(jobs))
     listing = Path(jobs[0].folder) / "slurm" / f"jobs-{uuid.uuid4().hex[:8]}.json"
@@ -115,7 +128,7 @@ def _one_array(
         running = True
         while left and running:
             time.sleep(POLL_SECONDS)
-            # Looked at first: what a task recorded before it ended is then seen below.
+            # Check this before reading the records: then no record of a task that has ended is missed below.
             running = not all(task.done() for task in tasks)
             for key in records.known_keys() & left.keys():
                 record = records.read(key)
@@ -148,7 +161,7 @@ def _executor(
     try:
         executor = submitit.AutoExecutor(folder=folder, cluster=cluster)
         if cluster is None and executor.cluster != "slurm":
-            raise MachineError("--slurm: no Slurm is found here (srun is not on the path)")
+            raise MachineError("--slurm: Slurm was not found (srun is not on the PATH)")
         executor.update_parameters(**settings)
     except (TypeError, ValueError, NameError, RuntimeError, AssertionError) as error:
         if isinstance(error, MachineError):

@@ -1,4 +1,4 @@
-"""A tuning process under supervision: within its limits of time and memory, or gone."""
+"""A tuning process under supervision: it is killed if it exceeds its limits of time or memory."""
 
 import contextlib
 import os
@@ -23,17 +23,19 @@ from vpltune.tuner.batch.messages import receive, send
 from vpltune.tuner.batch.record import Record
 
 START_SECONDS = 300.0
-"""For Python and its libraries to load: three on a quiet machine."""
+"""Time for Python and its libraries to load. A choice: it takes three seconds on an idle machine."""
 LOOK_SECONDS = 0.2
-"""Between two looks at the clock and at the memory of the process."""
+"""Interval between two checks of the time and memory of the process. A choice."""
 UNLIMITED_BYTES = 2**62
+"""The memory limit that stands for none. A choice: more than any machine has."""
 RENEWED_SHARE = 0.5
-"""Of the memory limit, above which a process is replaced before its next scene: libraries keep what they
-compiled, and their caches must not be charged to a scene that comes late."""
+"""A process that uses more than this share of its memory limit is replaced before its next scene. A choice:
+libraries cache what they compile, and those caches must not count against a later scene."""
 RENEWED_BYTES = 4 * 2**30
-"""The same, where the limit is large."""
+"""The same in bytes, for large limits: the smaller of the two counts. A choice."""
 
 Progress = Callable[[str, float], None]
+"""Called with the stage of a fit and the share of it that is done, in [0, 1]."""
 
 
 class StoppedError(Exception):
@@ -42,27 +44,36 @@ class StoppedError(Exception):
 
 @dataclass(frozen=True)
 class Limits:
-    """What one attempt at one scene may take, and how often it is made again."""
+    """Limits of one attempt at one scene, and the number of retries."""
 
     seconds: float
+    """Wall time."""
     memory_bytes: int
+    """Resident memory of the process and its children."""
     retries: int = 3
+    """Further attempts after the first one failed."""
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """How one attempt ended: with a record, with a failure, or with neither where another process has it."""
+    """Result of one attempt: a record, a failure, or neither if another process is working on the scene."""
 
     record: Record | None
     failure: str
+    """Reason of the failure; empty if there was none."""
     seconds: float
+    """Wall time."""
     limit_passed: bool = False
+    """Whether the attempt failed because it exceeded a limit."""
 
 
 class SupervisedProcess:
-    """A tuning process that is started when needed, and anew after it died or was stopped.
+    """A tuning process, started on demand and restarted after it died or was killed.
 
-    `threads`: how many each library in it may use. `stopped`: ends whatever runs, from another thread.
+    Args:
+        threads: Threads that each library in the process may use.
+        stopped: Another thread sets it to end the process.
+        module: The Python module that the process runs.
     """
 
     def __init__(
@@ -74,7 +85,13 @@ class SupervisedProcess:
         self._process: subprocess.Popen | None = None
 
     def attempt(self, job: Job, number: int, limits: Limits, progress: Progress) -> Attempt:
-        """Let the process fit `job`.
+        """Let the process fit `job`, and wait for the result.
+
+        Args:
+            job: What to fit.
+            number: Number of the attempt, from 1.
+            limits: Limits of time and memory.
+            progress: Called with each progress message of the fit.
 
         Raises:
             MachineError: this machine cannot fit anything.
@@ -106,7 +123,7 @@ class SupervisedProcess:
         return Attempt(record, answer.get("failed", ""), seconds)
 
     def close(self) -> None:
-        """End the process and all that it started."""
+        """Kill the process, if there is one, and all its children."""
         if self._process is None:
             return
         with contextlib.suppress(ProcessLookupError, PermissionError):
@@ -128,12 +145,19 @@ class SupervisedProcess:
                 stderr=self._words,
                 pass_fds=(theirs.fileno(),),
                 env={**os.environ, **thread_settings(self._threads)},
-                start_new_session=True,  # a group of its own: it is ended whole, and by nobody's Ctrl-C
+                start_new_session=True,  # own process group: killed as a whole, not reached by Ctrl-C
             )
         self._connection = Connection(ours.detach())
 
     def _answer(self, deadline: float, late: str, memory_bytes: int, progress: Progress) -> dict[str, Any]:
-        """The next message that is more than progress."""
+        """Wait for the next message that is not a progress report.
+
+        Raises:
+            _LimitPassedError: `deadline` passed, with `late` as its text, or more than `memory_bytes` were
+                used.
+            StoppedError: the batch was stopped.
+            EOFError, OSError: the process died.
+        """
         process = psutil.Process(self._process.pid)
         looked = 0.0
         while True:
@@ -151,14 +175,14 @@ class SupervisedProcess:
                 looked = now
                 if (used := memory_of(process)) > memory_bytes:
                     raise _LimitPassedError(
-                        f"it took {used / 2**20:.0f} MiB of memory, more than the limit of "
+                        f"it used {used / 2**20:.0f} MiB of memory, more than the limit of "
                         f"{memory_bytes / 2**20:.0f} MiB"
                     )
 
     def _renew_if_large_or_gone(self, limits: Limits) -> None:
         if self._process is not None:
             if self._process.poll() is not None:
-                self.close()  # it had nothing to do for long
+                self.close()  # the process ended because it was idle for too long
                 return
             with contextlib.suppress(psutil.Error):
                 most = min(RENEWED_SHARE * limits.memory_bytes, RENEWED_BYTES)
@@ -173,7 +197,7 @@ class SupervisedProcess:
         code, said = process.poll(), self._last_words()
         self.close()
         if code is not None and code < 0:
-            return f"its process died of {signal.Signals(-code).name}{said}"
+            return f"its process was killed by {signal.Signals(-code).name}{said}"
         return f"its process ended with exit code {code}{said}"
 
     def _last_words(self) -> str:
@@ -184,11 +208,11 @@ class SupervisedProcess:
 
 
 class _LimitPassedError(Exception):
-    """The attempt is over: a limit was passed."""
+    """The attempt exceeded a limit; the text says which."""
 
 
 def memory_of(process: psutil.Process) -> int:
-    """Resident bytes of a process and all that it started; 0 once it is gone."""
+    """Resident bytes of a process and all its children; 0 once the process is gone."""
     total = 0
     with contextlib.suppress(psutil.Error):
         for member in (process, *process.children(recursive=True)):
@@ -198,7 +222,7 @@ def memory_of(process: psutil.Process) -> int:
 
 
 def machine_memory_bytes() -> int:
-    """Memory that this machine, or the container that this process is in, has."""
+    """Total memory of this machine, or the limit of this process's container if that is lower."""
     total = psutil.virtual_memory().total
     with contextlib.suppress(OSError, ValueError):
         total = min(total, int(Path("/sys/fs/cgroup/memory.max").read_text()))
@@ -206,10 +230,10 @@ def machine_memory_bytes() -> int:
 
 
 def thread_settings(threads: int) -> Mapping[str, str]:
-    """Environment variables that keep JAX, llvmpipe, OpenMP and Dr.Jit to so many threads each."""
+    """Environment variables that limit JAX, llvmpipe, OpenMP and Dr.Jit to `threads` threads each."""
     return {
         "NPROC": str(threads),
-        "LP_NUM_THREADS": str(threads if threads > 1 else 0),  # 0: no threads beside the caller's own
+        "LP_NUM_THREADS": str(threads if threads > 1 else 0),  # 0: only the caller's thread
         "OMP_NUM_THREADS": str(threads),
         "VPLTUNE_THREADS": str(threads),
     }

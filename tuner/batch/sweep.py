@@ -1,4 +1,4 @@
-"""What killed processes left in a batch folder, taken away while nobody can be at work on it."""
+"""Clean a batch folder of what killed processes left, without disturbing processes that are at work."""
 
 import shutil
 from pathlib import Path
@@ -9,7 +9,7 @@ from vpltune.tuner.batch.record import Records
 
 
 def sweep(folder: Path) -> None:
-    """Remove temporary files, output folders that no record speaks of, and claims that nobody holds."""
+    """Delete temporary files, output folders without a record, and claims that no process holds."""
     records = Records(folder)
     for key, path in records.unfinished_files():
         with claimed(claim_path(folder, key)) as mine:
@@ -21,12 +21,12 @@ def sweep(folder: Path) -> None:
         key = name.rpartition("-")[2]
         if key not in known:
             with claimed(claim_path(folder, key)) as mine:
-                # Its fit may have ended between the two looks.
+                # The fit may have ended since the records were listed, so list them again.
                 if mine and not any(short_key(full) == key for full in records.known_keys()):
                     shutil.rmtree(folder / "scenes" / name, ignore_errors=True)
     for name in _names(folder / "claims"):
         with claimed(folder / "claims" / name):
-            pass  # one that nobody holds goes as it is let go of
+            pass  # taking and releasing a claim deletes its file
 
 
 def _names(folder: Path) -> list[str]:

@@ -1,4 +1,4 @@
-"""How long a batch still takes, from the scenes that are done and the size of those that are not."""
+"""Estimate the time that a batch still takes, from the time of finished scenes and the size of the others."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -8,35 +8,37 @@ from typing import Any
 from vpltune.tuner.batch.job import Job
 
 FIRST_GUESS_SECONDS = 10.0
+"""Intercept of the line before any scene is done. A choice: the order of magnitude on one core."""
 FIRST_GUESS_SECONDS_PER_MIB = 0.5
-"""Of a scene, before any was done: the order of magnitude on one core at the default size."""
+"""Slope of the line before any scene is done. A choice, like the intercept."""
 
 DEVIATIONS = 1.9
-"""Standard deviations that a forecast spans to each side: the truth lies in it four times in five or more."""
+"""Half-width of the forecast interval in standard deviations. A choice: the interval then holds the true time
+in at least four of five cases."""
 
 LEAST_SCENES = 3
-"""Done, before anything is said: two can be alike by chance."""
+"""Finished scenes before a forecast is given. A choice: two may be alike by chance."""
 
 
 @dataclass
 class SceneSeconds:
-    """Seconds of a scene as a line over its bytes, refitted as scenes finish."""
+    """Linear regression of the seconds of a scene on its size in bytes, updated as scenes finish."""
 
     bytes_done: list[int] = field(default_factory=list)
     seconds_done: list[float] = field(default_factory=list)
 
     def add(self, input_bytes: int, seconds: float) -> None:
-        """A scene of so many bytes took so long."""
+        """Add a finished scene."""
         self.bytes_done.append(input_bytes)
         self.seconds_done.append(seconds)
 
     def expected(self, input_bytes: int) -> float:
-        """Seconds that a scene of so many bytes should take; more for more bytes, and never nothing."""
+        """Expected seconds of a scene of this size; ≥ 0, and not decreasing in `input_bytes`."""
         intercept, slope = self._line()
         return intercept + slope * input_bytes
 
     def spread(self) -> float:
-        """Standard deviation of what scenes took, as a share of what was expected of them."""
+        """Standard deviation of actual ÷ expected seconds about 1; 1 before two scenes are done."""
         if len(self.seconds_done) < 2:
             return 1.0
         pairs = zip(self.bytes_done, self.seconds_done, strict=True)
@@ -44,10 +46,10 @@ class SceneSeconds:
         return pstdev(shares, 1.0) if shares else 1.0
 
     def deviation_of_sum(self, sizes: Sequence[int]) -> float:
-        """Standard deviation of the seconds of all of `sizes` together, the line's own doubt included.
+        """Standard deviation of the summed seconds of scenes of these sizes in bytes.
 
-        That of predictions from a line through n points (Draper and Smith 1998, 1.4), summed over scenes,
-        with a scatter that grows with the scene.
+        It is the prediction error of a line through n points (Draper and Smith 1998, section 1.4), summed
+        over the scenes, with a scatter proportional to the expected seconds. At least one scene must be done.
         """
         mean = fmean(self.bytes_done)
         variance = sum((size - mean) ** 2 for size in self.bytes_done)
@@ -65,7 +67,8 @@ class SceneSeconds:
             return mean_seconds, 0.0
         pairs = zip(self.bytes_done, self.seconds_done, strict=True)
         slope = sum((size - mean_bytes) * (seconds - mean_seconds) for size, seconds in pairs) / variance
-        # No scene is faster for being larger, and a line through large ones must not end below zero.
+        # Clamp the slope: a larger scene is never expected to be faster, and the intercept must not be
+        # negative.
         slope = min(max(slope, 0.0), mean_seconds / max(mean_bytes, 1.0))
         return mean_seconds - slope * mean_bytes, slope
 
@@ -73,13 +76,16 @@ class SceneSeconds:
 def seconds_left(
     model: SceneSeconds, waiting: Iterable[int], running: Iterable[tuple[int, float]], workers: int
 ) -> tuple[float, float]:
-    """Low and high estimate of the seconds until the last scene is done, `DEVIATIONS` to each side.
+    """Interval for the seconds until the last scene is done, `DEVIATIONS` wide to each side.
 
     Args:
-        model: what scenes took so far.
-        waiting: bytes of each scene not yet begun.
-        running: bytes of each scene at work, and the seconds it has had.
-        workers: how many scenes are done at a time.
+        model: Regression over the finished scenes.
+        waiting: Size in bytes of each scene that has not started.
+        running: Size in bytes and elapsed seconds of each scene in progress.
+        workers: Scenes that are fitted at a time.
+
+    Returns:
+        Lower and upper end, ≥ 0.
     """
     waiting, running = list(waiting), list(running)
     sizes = waiting + [size for size, _ in running]
@@ -87,7 +93,7 @@ def seconds_left(
         return 0.0, 0.0
     left = [model.expected(size) for size in waiting]
     left += [max(model.expected(size) - had, 0.0) for size, had in running]
-    # Shared out evenly, but for whoever gets the last scene.
+    # The work is shared evenly, except that the worker with the last scene finishes later than the others.
     last = (1.0 - 1.0 / workers) * fmean(left)
     middle = max(sum(left) / workers + 0.5 * last, *left)
     off = DEVIATIONS * model.deviation_of_sum(sizes) / workers + model.spread() * last
@@ -95,7 +101,7 @@ def seconds_left(
 
 
 class Forecast:
-    """Follows a batch by its events, and says when it ends. Times are those of one steady clock."""
+    """Follows the events of a batch and estimates its end. All times are seconds of one monotonic clock."""
 
     def __init__(self, workers: int) -> None:
         self._workers = workers
@@ -106,12 +112,12 @@ class Forecast:
         self.done = 0
 
     def found(self, jobs: Sequence[Job]) -> None:
-        """These are to be done."""
+        """Set the jobs of the batch."""
         self._waiting = {job.key: job.input_bytes for job in jobs}
         self.total = len(jobs)
 
     def happened(self, event: dict[str, Any], now: float) -> None:
-        """A scheduler's event, seen at `now`."""
+        """Take an event of the scheduler into account, which occurred at `now`."""
         key = event.get("key", "")
         if event["event"] == "workers":
             self._workers = max(1, event["count"])
@@ -121,11 +127,11 @@ class Forecast:
             self.done += 1
             size, _ = self._running.pop(key, (self._waiting.pop(key, 0), now))
             if event["status"] != "refused":
-                # All attempts at it, as far as they are known.
+                # Estimate of all attempts: only the time of the last is known.
                 self._model.add(size, event["seconds"] * event["attempts"])
 
     def seconds_left(self, now: float) -> tuple[float, float] | None:
-        """Low and high estimate; None before three scenes were fitted."""
+        """Interval for the seconds left, see `seconds_left`; None until `LEAST_SCENES` scenes are fitted."""
         if len(self._model.seconds_done) < LEAST_SCENES:
             return None
         running = [(size, now - since) for size, since in self._running.values()]

@@ -1,4 +1,4 @@
-"""One scene, once: the function that every scheduler calls, on whatever machine."""
+"""Tune one scene exactly once. Every scheduler calls this, on any machine."""
 
 import datetime
 import resource
@@ -17,10 +17,19 @@ Progress = Callable[[str, float], None]
 
 
 def tune_one(job: Job, attempt: int = 1, progress: Progress = lambda stage, share: None) -> Record | None:
-    """Fit the scene of `job` unless that is done, and return its record; None while another process is at it.
+    """Fit the scene of `job` unless it has a record, and return the record.
 
-    It may be called any number of times, at once and anywhere: the record on disk decides, and it is
-    written last, so that what it says is there is there. What a killed process left is made anew.
+    Any number of processes on any machines may call this at once for the same job: the record on disk
+    decides. It is written last, so the files that it names are complete. Output that a killed process left is
+    replaced.
+
+    Args:
+        job: What to fit.
+        attempt: Number of the attempt, from 1.
+        progress: Called with the stage and the share of it that is done, in [0, 1].
+
+    Returns:
+        The record, or None if another process is working on the scene.
 
     Raises:
         MachineError: this machine cannot fit anything.
@@ -33,7 +42,7 @@ def tune_one(job: Job, attempt: int = 1, progress: Progress = lambda stage, shar
     with claimed(job.claim) as mine:
         if not mine:
             return None
-        # Whoever held the claim until now may have finished.
+        # The previous holder of the claim may have written the record.
         record = records.read(job.key)
         if record is None:
             record = _fitted(job, attempt, progress)
@@ -42,7 +51,10 @@ def tune_one(job: Job, attempt: int = 1, progress: Progress = lambda stage, shar
 
 
 def set_aside(job: Job, reason: str, attempts: int, seconds: float) -> Record | None:
-    """Record that every attempt failed; the record of another process stands, and None if one is at work."""
+    """Record that every attempt failed, and return the record.
+
+    If the scene has a record by now, that one is returned. None if another process is working on the scene.
+    """
     records = Records(Path(job.folder))
     with claimed(job.claim) as mine:
         if not mine:
@@ -56,7 +68,7 @@ def set_aside(job: Job, reason: str, attempts: int, seconds: float) -> Record | 
 
 
 def _fitted(job: Job, attempt: int, progress: Progress) -> Record:
-    # Here, so that a scheduler can name this function without loading JAX.
+    # Imported here, so that a scheduler can import this module without loading JAX.
     from vpltune.tuner.scene_fit.fit_scene import fit_scene
 
     started = time.perf_counter()
@@ -65,7 +77,7 @@ def _fitted(job: Job, attempt: int, progress: Progress) -> Record:
         result = fit_scene(Path(job.scene), job.output, job.options.fit_options(job.command), progress)
     except InputError as error:
         if str(error).startswith(job.folder):
-            raise  # the output cannot be written, which is no fault of the scene's
+            raise  # the output folder cannot be written to; the scene is not to blame
         return _record(job, "refused", str(error), time.perf_counter() - started, attempt, "")
     document = result.document
     status: Status = "unlit" if document["status"] == "unlit" else "done"
@@ -102,7 +114,7 @@ def _record(
         output=output,
         host=socket.gethostname(),
         finished=datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds"),
-        # Linux counts in KiB.
+        # ru_maxrss is in KiB on Linux.
         peak_memory_bytes=1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss if stages else 0,
         fit=fit,
         stages=dict(stages or {}),

@@ -1,7 +1,7 @@
-"""The process that fits: takes jobs from its parent one after another, and reports how each ended.
+"""The process that fits. It takes jobs from its parent, one at a time, and reports the result of each.
 
-Started as `python -m vpltune.tuner.batch.tuning_process FD`, with FD one end of a socket. A scene that
-brings the process down, or that has to be stopped, takes nobody else with it.
+It is started as `python -m vpltune.tuner.batch.tuning_process FD`, where FD is one end of a socket. It is a
+separate process so that a scene that crashes or has to be stopped affects no other.
 """
 
 import contextlib
@@ -20,14 +20,15 @@ from vpltune.tuner.batch.record import as_document
 from vpltune.tuner.batch.tune_one import tune_one
 
 IDLE_SECONDS = 120.0
-"""Without a job, after which it ends: a cluster's worker stays when a batch is over, and memory is dear."""
+"""The process ends after this time without a job. A choice: cluster workers outlive the batch, and an idle
+process would keep its memory."""
 
 
 def main(handle: int) -> None:
-    """Serve until no job comes, or the parent closes the socket or dies."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
+    """Serve jobs from file descriptor `handle` until there are none, or the parent closes it or dies."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C
     threading.Thread(target=_die_with_parent, daemon=True).start()
-    import vpltune.tuner.scene_fit.fit_scene  # noqa: F401  before the first job, whose time is limited
+    import vpltune.tuner.scene_fit.fit_scene  # noqa: F401  now, not within the time limit of the first job
 
     connection = Connection(handle)
     with contextlib.suppress(EOFError, OSError):
@@ -45,7 +46,7 @@ def _outcome(connection: Connection, job: Job, attempt: int) -> dict[str, Any]:
         record = tune_one(job, attempt, progress)
     except MachineError as error:
         return {"machine_error": str(error)}
-    # A defect, a full disk, no memory: the attempt failed, and the next scene may fare better.
+    # A bug, a full disk, or no memory left: this attempt failed, but other scenes may succeed.
     except Exception as error:
         traceback.print_exc()
         return {"failed": f"{type(error).__name__}: {error}"}
@@ -53,7 +54,7 @@ def _outcome(connection: Connection, job: Job, attempt: int) -> dict[str, Any]:
 
 
 def _die_with_parent() -> None:
-    # The parent holds the other end of stdin and never writes: its end is the parent's.
+    # The parent holds the other end of stdin and never writes, so end of file means that the parent died.
     while os.read(0, 4096):
         pass
     os.killpg(0, signal.SIGKILL)

@@ -1,1 +1,1 @@
-"""Checks of the machine that vpltune doctor runs."""
+"""The checks behind `vpltune doctor`: which of the required libraries work on this machine."""

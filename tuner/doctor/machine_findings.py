@@ -1,7 +1,7 @@
-"""What of this machine works: one finding per thing that the program stands on.
+"""Check this machine: one finding for each dependency of the program.
 
-Each probe runs in a process of its own, with a time limit, because a bad driver or an LLVM too old
-for the processor ends the whole process: that, too, is a finding.
+Each probe runs in a separate process with a time limit, because a bad driver, or an LLVM library too old for
+the processor, kills the whole process. A crash is a finding too.
 """
 
 import json
@@ -11,28 +11,32 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Literal
+
+from vpltune.tuner.doctor.extras import how_to_install, missing_modules
 
 State = Literal["ok", "fallback", "missing"]
 
 PROBE_SECONDS = 150.0
-"""Longer than Mitsuba's own search for an LLVM library that works, which has limits of its own."""
+"""Time limit of a probe. A choice: enough for two timeouts in the search for an LLVM library
+(`tuner.reference.variant`)."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing the program stands on, as found on this machine."""
+    """The state of one dependency on this machine."""
 
     name: str
     state: State
     detail: str
-    """What was found, in one line."""
+    """What was found; one line."""
     fallback: str = ""
-    """What is used instead, where the state is "fallback"."""
+    """What is used instead, if the state is "fallback"."""
     mend: str = ""
-    """The one command that mends it, where the state is not "ok"."""
+    """The command that fixes it, if the state is not "ok"."""
     required: bool = True
-    """Whether the program is of no use without it."""
+    """Whether the program does not work without it."""
 
     def as_dict(self) -> dict[str, str | bool]:
         """The finding as `vpltune doctor --json` prints it."""
@@ -41,30 +45,44 @@ class Finding:
 
 @dataclass(frozen=True)
 class Probe:
-    """How a finding is made: a function of `tuner.doctor.machine_probes`, and what its death means."""
+    """One check: a function of `tuner.doctor.machine_probes`, and what to report if its process crashes."""
 
     name: str
+    """Key of `PROBE_FUNCTIONS`."""
     mend: str
+    """The command that fixes it."""
     required: bool
+    """Whether the program does not work without it."""
+    extra: str = ""
+    """The extra that it checks. Without that extra it is not run and nothing is required."""
 
 
+# Commands that fix a finding.
 APT_OPENGL = "apt-get install -y libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri"
 APT_LLVM = "apt-get install -y libllvm19"
-PIP = f"{sys.executable} -m pip install --require-hashes -r requirements.txt"
+_REQUIREMENTS = Path(__file__).resolve().parents[2] / "requirements.txt"
+# An installed package has no requirements.txt beside it.
+PIP = (
+    f"{sys.executable} -m pip install --require-hashes -r {_REQUIREMENTS}"
+    if _REQUIREMENTS.is_file()
+    else f"{sys.executable} -m {how_to_install('tuner')}"
+)
 
+# All checks, in the order of the table.
 PROBES = (
     Probe("python", "apt-get install -y python3.11 python3.11-venv", True),
     Probe("egl", APT_OPENGL, True),
     Probe("opengl", APT_OPENGL, True),
-    Probe("jax", PIP, True),
-    Probe("llvm", APT_LLVM, False),
-    Probe("mitsuba", PIP, True),
+    Probe("extras", PIP, False),
+    Probe("jax", PIP, True, "tuner"),
+    Probe("llvm", APT_LLVM, False, "tuner"),
+    Probe("mitsuba", PIP, True, "tuner"),
     Probe("cache", "export VPLTUNE_CACHE=/a/folder/that/can/be/written", False),
 )
 
 
 def examine_machine(seconds: float = PROBE_SECONDS) -> tuple[Finding, ...]:
-    """All findings, in the order of `PROBES`; each probe gets at most `seconds`."""
+    """Run all probes in parallel, each for at most `seconds`. The findings are in the order of `PROBES`."""
     with ThreadPoolExecutor(max_workers=max(1, os.cpu_count() or 1)) as pool:
         return tuple(pool.map(lambda probe: run_probe(probe, seconds), PROBES))
 
@@ -72,22 +90,25 @@ def examine_machine(seconds: float = PROBE_SECONDS) -> tuple[Finding, ...]:
 def run_probe(
     probe: Probe, seconds: float = PROBE_SECONDS, module: str = "vpltune.tuner.doctor.machine_probes"
 ) -> Finding:
-    """The finding of one probe: what its process says, or how that process died."""
+    """Run one probe in a separate process, for at most `seconds`. A crash or a timeout is a finding too."""
+    if probe.extra and missing_modules(probe.extra):
+        detail = f"needs vpltune[{probe.extra}], which is not installed"
+        return Finding(probe.name, "missing", detail, mend=how_to_install(probe.extra), required=False)
     command = [sys.executable, "-m", module, probe.name]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=seconds, check=False)
     except subprocess.TimeoutExpired:
         return _died(probe, f"no answer within {seconds:g} s")
     except OSError as error:
-        return _died(probe, f"cannot be tried ({error.strerror})")
+        return _died(probe, f"the probe cannot be run ({error.strerror})")
     if done.returncode < 0:
-        return _died(probe, f"trying it ended the process with {signal.Signals(-done.returncode).name}")
+        return _died(probe, f"the probe was killed by {signal.Signals(-done.returncode).name}")
     try:
-        # A library may have printed before.
+        # The finding is the last line: a library may have printed something before it.
         said = json.loads(done.stdout.strip().rpartition("\n")[2])
         return Finding(name=probe.name, required=probe.required, **said)
     except (ValueError, TypeError):
-        last = done.stderr.strip().rpartition("\n")[2] or f"exit code {done.returncode} without a word"
+        last = done.stderr.strip().rpartition("\n")[2] or f"exit code {done.returncode} and no output"
         return _died(probe, last)
 
 

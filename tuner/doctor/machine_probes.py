@@ -1,6 +1,7 @@
-"""The probes of `vpltune doctor`: `python -m vpltune.tuner.doctor.machine_probes NAME` prints one finding as JSON.
+"""The probes of `vpltune doctor`.
 
-Run by `tuner.doctor.machine_findings`, each in a process of its own.
+`python -m vpltune.tuner.doctor.machine_probes NAME` prints one finding as JSON.
+`tuner.doctor.machine_findings` runs each probe in a separate process.
 """
 
 import ctypes
@@ -11,16 +12,18 @@ import shutil
 import sys
 from collections.abc import Callable, Mapping
 
+from vpltune.tuner.doctor.extras import EXTRA_MODULES, how_to_install, missing_modules
 from vpltune.tuner.doctor.machine_findings import APT_LLVM, APT_OPENGL, PIP
 
 Said = Mapping[str, str]
-"""The members of a `Finding` that a probe decides: state, detail, fallback, mend."""
+"""The fields of a `Finding` that a probe sets: state, detail, fallback, mend."""
 
 OLDEST_PYTHON = (3, 11)
+"""From `requires-python` in pyproject.toml."""
 
 
 def probe_python() -> Said:
-    """Python itself."""
+    """The Python version."""
     detail = f"{platform.python_version()} at {sys.executable}"
     if sys.version_info < OLDEST_PYTHON:
         return {"state": "missing", "detail": f"{detail}; 3.11 or newer is needed"}
@@ -28,7 +31,7 @@ def probe_python() -> Said:
 
 
 def probe_egl() -> Said:
-    """The library through which OpenGL comes up without a screen."""
+    """libEGL, which creates OpenGL contexts without a display."""
     try:
         ctypes.CDLL("libEGL.so.1")
     except OSError as error:
@@ -37,7 +40,7 @@ def probe_egl() -> Said:
 
 
 def probe_opengl() -> Said:
-    """A headless OpenGL 4.5 context whose compute shaders compute."""
+    """A headless OpenGL 4.5 context that runs a compute shader correctly."""
     import numpy as np
 
     from vpltune.renderer.gpu.gpu_context import create_context
@@ -54,20 +57,33 @@ def probe_opengl() -> Said:
     context.compute_shader(source).run(1)
     context.finish()
     if not (np.frombuffer(output.read(), np.float32) == np.arange(64.0) ** 2).all():
-        return {"state": "missing", "detail": "a compute shader gave wrong numbers", "mend": APT_OPENGL}
+        return {"state": "missing", "detail": "a compute shader returned wrong values", "mend": APT_OPENGL}
     renderer = context.info["GL_RENDERER"]
     detail = f"{renderer}, OpenGL {context.version_code / 100:.1f}, compute shaders work"
     if any(name in renderer.lower() for name in ("llvmpipe", "softpipe", "swrast")):
         return {
             "state": "fallback",
             "detail": detail,
-            "fallback": "Mesa draws on the processor: the same images, more slowly",
+            "fallback": "Mesa renders on the CPU: the same images, but slower",
         }
     return {"state": "ok", "detail": detail}
 
 
+def probe_extras() -> Said:
+    """The extras that are installed. Without `tuner` there is only the runtime."""
+    missing = {extra: modules for extra in EXTRA_MODULES if (modules := missing_modules(extra))}
+    parts = {
+        "installed": [extra for extra in EXTRA_MODULES if extra not in missing],
+        "not installed": [f"{extra} (no {', '.join(modules)})" for extra, modules in missing.items()],
+    }
+    detail = "; ".join(f"{part}: {', '.join(names)}" for part, names in parts.items() if names)
+    if "tuner" in missing:
+        return {"state": "missing", "detail": detail, "mend": how_to_install("tuner")}
+    return {"state": "ok", "detail": detail}
+
+
 def probe_jax() -> Said:
-    """JAX compiles and differentiates on some device."""
+    """JAX, which has to compile and differentiate a function."""
     import jax
 
     slope = jax.jit(jax.grad(lambda x: x**3))(2.0)
@@ -82,7 +98,7 @@ def probe_jax() -> Said:
 
 
 def probe_llvm() -> Said:
-    """LLVM libraries that Mitsuba could use."""
+    """The LLVM libraries that Mitsuba may use."""
     from vpltune.tuner.reference.variant import llvm_libraries
 
     named = os.environ.get("DRJIT_LIBLLVM_PATH")
@@ -98,7 +114,7 @@ def probe_llvm() -> Said:
 
 
 def probe_mitsuba() -> Said:
-    """The Mitsuba variant that references are made with."""
+    """The Mitsuba variant that renders the references."""
     import importlib.metadata
 
     from vpltune.tuner.reference import describe_variant
@@ -111,7 +127,7 @@ def probe_mitsuba() -> Said:
 
 
 def probe_cache() -> Said:
-    """The folder where references are kept."""
+    """The cache folder for references, which must be writable."""
     from vpltune.renderer.errors import InputError
     from vpltune.renderer.files.atomic_file import written_whole
     from vpltune.tuner.reference.cache import cache_folder
@@ -125,18 +141,20 @@ def probe_cache() -> Said:
         return {
             "state": "fallback",
             "detail": str(error),
-            "fallback": "references are made anew every time",
+            "fallback": "references are rendered again every time",
             "mend": "export VPLTUNE_CACHE=/a/folder/that/can/be/written",
         }
     kept = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
     free = shutil.disk_usage(folder).free
-    return {"state": "ok", "detail": f"{folder}: {kept / 2**20:.1f} MiB kept, {free / 2**30:.1f} GiB free"}
+    return {"state": "ok", "detail": f"{folder}: {kept / 2**20:.1f} MiB used, {free / 2**30:.1f} GiB free"}
 
 
+# The probes by the name that the command line takes.
 PROBE_FUNCTIONS: Mapping[str, Callable[[], Said]] = {
     "python": probe_python,
     "egl": probe_egl,
     "opengl": probe_opengl,
+    "extras": probe_extras,
     "jax": probe_jax,
     "llvm": probe_llvm,
     "mitsuba": probe_mitsuba,

@@ -1,1 +1,1 @@
-"""Metrics: error measures of an image against its reference, and how an error is shown."""
+"""Error metrics of an image against its reference, and maps that show where the error is."""

@@ -1,6 +1,6 @@
-"""Images of where the error is: signed error of irradiance, and HDR-FLIP of the whole image.
+"""Error maps: signed error of irradiance, and HDR-FLIP of the whole image.
 
-Both are palette images, so that a map weighs a byte a pixel, and what is not valid is transparent.
+Both are palette images with one byte per pixel before compression. Invalid pixels are transparent.
 """
 
 import io
@@ -16,14 +16,14 @@ DIVERGING = (
     *("#053061", "#2166ac", "#4393c3", "#92c5de", "#d1e5f0", "#f7f7f7"),
     *("#fddbc7", "#f4a582", "#d6604d", "#b2182b", "#67001f"),
 )
-"""ColorBrewer RdBu (Brewer 2003), which colour-blind readers tell apart: blue is too dark, red too bright."""
+"""ColorBrewer RdBu (Brewer 2003), safe for colour-blind readers: blue is too dark, red too bright."""
 MAGMA = (
     *("#000004", "#180f3d", "#440f76", "#721f81", "#9e2f7f"),
     *("#cd4071", "#f1605d", "#fd9668", "#feca8d", "#fcfdbf"),
 )
-"""Van der Walt and Smith (2015), even in lightness; the colours that FLIP's authors use."""
-_LEVELS = 255
-_TRANSPARENT = 255
+"""Magma by van der Walt and Smith (2015), perceptually uniform in lightness; used by the authors of FLIP."""
+_LEVELS = 255  # colours of the palette
+_TRANSPARENT = 255  # the remaining palette index
 
 
 def signed_error(
@@ -31,9 +31,10 @@ def signed_error(
     reference: Float[np.ndarray, "height width 3"],
     valid: Bool[np.ndarray, "height width"],
 ) -> Float[np.ndarray, "height width"]:
-    """(y − r)/√(r² + 0.01·mean(r)²) of luminance: −1 is black where there is light, 1 about twice as bright.
+    """Signed relative error of the luminance: (y − r)/√(r² + 0.01·mean(r)²), 0 for invalid pixels.
 
-    It is the signed root of what relMSE averages (see `tuner.metrics.view_metrics.relmse`); 0 where not valid.
+    −1 means black instead of lit, 1 about twice as bright as the reference. It is the signed root of the
+    summand of relMSE (`tuner.metrics.view_metrics.relmse`). Against a black reference it is +∞ where y > 0.
     """
     y, r = irradiance.astype(np.float64) @ LUMINANCE, reference.astype(np.float64) @ LUMINANCE
     mean = float(r[valid].mean()) if valid.any() else 0.0
@@ -49,7 +50,7 @@ def map_png(
     colours: tuple[str, ...],
     valid: Bool[np.ndarray, "height width"],
 ) -> bytes:
-    """`values` from `low` to `high` in `colours`, beyond them in the end colours, as a PNG file."""
+    """The bytes of a PNG file that shows `values`, clamped to [`low`, `high`], in interpolated `colours`."""
     share = (np.clip(values, low, high) - low) / (high - low)
     indices = np.round(share * (_LEVELS - 1)).astype(np.uint8)
     image = Image.fromarray(np.where(valid, indices, np.uint8(_TRANSPARENT)))
@@ -66,7 +67,7 @@ def map_pixels(
     colours: tuple[str, ...],
     valid: Bool[np.ndarray, "height width"],
 ) -> UInt8[np.ndarray, "height width 3"]:
-    """The same as pixels, white where not valid."""
+    """The pixels of `map_png`, sRGB, with invalid pixels white."""
     image = Image.open(io.BytesIO(map_png(values, low, high, colours, valid))).convert("RGBA")
     return np.asarray(Image.alpha_composite(Image.new("RGBA", image.size, "white"), image).convert("RGB"))
 

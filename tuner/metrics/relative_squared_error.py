@@ -2,11 +2,11 @@
 
     relMSE(y, r) = mean((y − r)² / (r² + 0.01·mean(r)²))
 
-over valid pixels and channels. With r = (a + b)/2 from two independent halves, (y − r)² holds the noise of
-r as well; (y − a)(y − b) has the same expectation without it, since the noise of a and of b multiply to
-zero in the mean.
+over valid pixels and channels. The reference r = (a + b)/2 is the mean of two independent halves. (y − r)²
+contains the noise of r. (y − a)(y − b) has the same expectation without that noise, because the product of
+the noise of a and the noise of b has mean zero.
 
-A fit does not minimise relMSE itself, which a few pixels can rule, but reweights the pixels for robustness
+A fit does not minimise relMSE itself, which a few pixels can dominate. It reweights the pixels for robustness
 (`tuner.metrics.robust_error`).
 """
 
@@ -18,25 +18,24 @@ import numpy as np
 from jaxtyping import Array, Float, Float32
 
 DARK_SHARE = 0.01
-"""Share of the squared mean that is added to r²: a black pixel must not weigh infinitely."""
+"""Share of mean(r)² that is added to r², so that black pixels have a finite weight. A choice."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Target:
-    """What the image of one view is compared with."""
+    """The reference of one view and the weights of its values."""
 
     half_a: Float[Array, "receivers 3"]
+    """One half of the reference [W/m²]."""
     half_b: Float[Array, "receivers 3"]
+    """The other half, with independent noise [W/m²]."""
     weight: Float[Array, "receivers 3"]
-    """The weight of each value in the sum of squares [1/(W/m²)²]; zero for a black view."""
+    """Weight of each value in the sum of squares [1/(W/m²)²]; zero for a black view."""
 
 
 def relative_weight(mean: Float[np.ndarray, "receivers 3"]) -> Float[np.ndarray, "receivers 3"]:
-    """1/(r² + 0.01·mean(r)²) over the number of values: with it, the weighted squared error is relMSE.
-
-    Zero for a view in which no light arrives: it has nothing to say.
-    """
+    """1/(r² + 0.01·mean(r)²) ÷ number of values [1/(W/m²)²]: the weights of relMSE. Zero for a black view."""
     level = mean.mean() ** 2 if mean.size else 0.0
     return 1.0 / (mean**2 + DARK_SHARE * level) / mean.size if level > 0.0 else np.zeros_like(mean)
 
@@ -46,10 +45,12 @@ def target_of(
     half_b: Float32[np.ndarray, "receivers 3"],
     weight: Float[np.ndarray, "receivers 3"] | None = None,
 ) -> Target:
-    """The target of one view from both halves of its reference at the receivers [W/m²].
+    """The target of one view.
 
     Args:
-        weight: of each value; None takes that of relMSE.
+        half_a: One half of the reference at the receivers [W/m²].
+        half_b: The other half [W/m²].
+        weight: Weight of each value [1/(W/m²)²]; None for the weights of relMSE.
     """
     if weight is None:
         weight = relative_weight((half_a.astype(np.float64) + half_b) / 2.0)
@@ -57,5 +58,5 @@ def target_of(
 
 
 def weighted_squared_error(image: Float[Array, "receivers 3"], target: Target) -> Float[Array, ""]:
-    """Σ weight·(y − a)(y − b): what one step of a fit minimises."""
+    """Σ weight·(y − a)(y − b), which each step of a fit minimises. May be negative because of noise."""
     return jnp.sum(target.weight * (image - target.half_a) * (image - target.half_b))

@@ -1,23 +1,23 @@
-"""The error that a fit minimises: relative, masked by direct light, and robust against single pixels.
+"""The error that a fit minimises: relative, masked by direct light, and robust against outliers.
 
-Each value of a view weighs
+The weight of each value of a view is
 
     w = (1 − p)/(r² + 0.01·m²) + p/((r + d)² + 0.01·m²),    p = MASKED_SHARE
 
-with r the reference's indirect and d its direct irradiance and m the view's mean of r. The first term is that
-of relMSE. The second measures the error beside all the light at the pixel, as the eye and FLIP do: strong
-direct light masks it. Both are made once, from the reference alone.
+where r is the indirect and d the direct irradiance of the reference, and m is the mean of r over the view.
+The first term is that of relMSE. The second relates the error to all light at the pixel, as the eye and FLIP
+do: strong direct light masks it. The weights depend on the reference alone and are computed once.
 
-relMSE alone is ruled by a few dark pixels that leak, and plain squared error by a few bright ones. So a
-pixel's error e = √mean_c(w·(y − r)²) counts by the pseudo-Huber function
+A few dark pixels with light leaks dominate relMSE, and a few bright pixels dominate plain squared error. So
+the error of a pixel, e = √mean_c(w·(y − r)²), enters through the pseudo-Huber function
 
     ρ(e) = 2s²·(√(1 + (e/s)²) − 1)
 
-which is e² for e ≪ s and grows as 2s·e beyond (Charbonnier et al. 1997, "Deterministic edge-preserving
-regularization in computed imaging"). The scale s is the median of e over the view in the image that the fit
-starts from, one for all candidates, so that their costs compare. Iteratively reweighted least squares with
-the weights ρ′(e)/(2e) = 1/√(1 + (e/s)²) lowers Σρ at every step (Holland and Welsch 1977), and each step is
-the least-squares problem of `tuner.surrogate.reduced_gather`.
+It is e² for e ≪ s and grows like 2s·e beyond (Charbonnier et al. 1997, "Deterministic edge-preserving
+regularization in computed imaging"). The scale s is the median of e over the view for the image that the fit
+starts from. It is the same for all candidates, so their costs are comparable. Iteratively reweighted least
+squares with the weights ρ′(e)/(2e) = 1/√(1 + (e/s)²) reduces Σρ in every step (Holland and Welsch 1977). Each
+step is the least-squares problem of `tuner.surrogate.reduced_gather`.
 """
 
 from dataclasses import dataclass
@@ -28,15 +28,15 @@ from jaxtyping import Float, Float64
 from vpltune.tuner.metrics.relative_squared_error import DARK_SHARE
 
 MASKED_SHARE = 0.5
-"""Weight of the error beside all light. A choice: over nine scenes of development, 0, ½ and 1 left held-out
-relMSE and FLIP within 2 % of each other."""
+"""p, the weight of the second term. A choice: on nine development scenes, 0, ½ and 1 gave held-out relMSE and
+FLIP within 2 % of each other."""
 LEAST_SCALE = 1e-4
-"""The least scale, relative: below 0.01 % errors are rounding."""
+"""Lower limit of s, relative. A choice: errors below 0.01 % are rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class RobustError:
-    """How the errors of one view are counted."""
+    """The robust error of images of one view. An image is the indirect irradiance at the receivers."""
 
     reference: Float64[np.ndarray, "receivers 3"]
     """r [W/m²]."""
@@ -46,15 +46,15 @@ class RobustError:
     """s, relative."""
 
     def costs(self, image: Float[np.ndarray, "receivers 3"]) -> Float64[np.ndarray, " receivers"]:
-        """ρ at every receiver for an image y [W/m²]."""
+        """ρ at each receiver for an image y [W/m²]; relative, ≥ 0."""
         return 2.0 * self.scale**2 * (np.hypot(1.0, self._error(image) / self.scale) - 1.0)
 
     def cost(self, image: Float[np.ndarray, "receivers 3"]) -> float:
-        """The mean of ρ over the receivers for an image y [W/m²]; 0 without receivers."""
+        """Mean of ρ over the receivers for an image y [W/m²]; 0 without receivers."""
         return float(self.costs(image).mean()) if len(image) else 0.0
 
     def weights(self, image: Float[np.ndarray, "receivers 3"]) -> Float64[np.ndarray, "receivers 3"]:
-        """What each value of the image weighs in the next least-squares step, over the number of values."""
+        """Weight of each value in the next least-squares step, ÷ number of values [1/(W/m²)²]."""
         robust = 1.0 / np.hypot(1.0, self._error(image) / self.scale)
         return self.weight * robust[:, None] / max(self.weight.size, 1)
 
@@ -67,8 +67,13 @@ def robust_error(
     direct: Float[np.ndarray, "receivers 3"],
     start: Float[np.ndarray, "receivers 3"],
 ) -> RobustError:
-    """How errors count in a view with these irradiances [W/m²], `start` being the image that a fit begins
-    with."""
+    """The robust error of one view.
+
+    Args:
+        reference: Indirect irradiance of the reference [W/m²].
+        direct: Direct irradiance of the reference [W/m²].
+        start: Indirect irradiance at the start of the fit [W/m²], which sets the scale s.
+    """
     r, d = reference.astype(np.float64), direct.astype(np.float64)
     level = r.mean() ** 2 if r.size else 0.0
     weight = np.zeros_like(r)

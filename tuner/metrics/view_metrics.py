@@ -1,6 +1,7 @@
-"""How far an image is from its reference: errors and energy of irradiance, HDR-FLIP of the light.
+"""Error metrics of an image against its reference: errors and energy of irradiance, HDR-FLIP of radiance.
 
-All but FLIP are relative to the reference: against a black one they are NaN, null in JSON.
+All metrics but FLIP are relative to the reference. Against a black reference they are NaN, which is null in
+JSON.
 """
 
 import math
@@ -9,8 +10,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from statistics import fmean
 
-# FLIP's threads spin while they wait for each other: on a busy machine two of them took ten times as long
-# as one for images of this size. Read once, when its library is loaded.
+# FLIP's threads busy-wait for each other: on a loaded machine, two took ten times as long as one for images
+# of this size. The variable is read once, when the library is loaded.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import flip_evaluator
@@ -20,31 +21,31 @@ from jaxtyping import Bool, Float, Float64
 from vpltune.tuner.metrics.relative_squared_error import DARK_SHARE
 
 WORST_SHARE = 0.001
-"""Share of a view's pixels that the trimmed relMSE leaves out: the worst ones, rounded up to whole pixels."""
+"""Share of the pixels, the worst, that trimmed relMSE leaves out; rounded up to whole pixels. A choice."""
 
 
 @dataclass(frozen=True)
 class ViewMetrics:
-    """The figures of one view, or the mean over several."""
+    """The metrics of one view, or their mean over several views."""
 
     relmse: float
-    """mean((y − r)²/(r² + 0.01·mean(r)²)) over valid pixels and channels; includes the reference's noise."""
+    """mean((y − r)²/(r² + 0.01·mean(r)²)) over valid pixels and channels; includes reference noise."""
     trimmed_relmse: float
     """relMSE without the worst `WORST_SHARE` of the pixels."""
     worst_share: float
-    """Share of the relMSE that these worst pixels hold, in [0, 1]."""
+    """Share of the relMSE that is in these worst pixels, in [0, 1]."""
     median_error: float
-    """The relative error of the typical pixel: median of Σ_c|y − r|/Σ_c r over valid, lit pixels."""
+    """Median over valid, lit pixels of the relative error Σ_c|y − r| ÷ Σ_c r."""
     energy_ratio: float
     """mean(y)/mean(r) over valid pixels and channels."""
     flip: float
     """Mean HDR-FLIP (Andersson et al. 2021) of direct plus indirect radiance, in [0, 1]. Both images have the
-    runtime's albedo, so that light is compared and texture filtering is not."""
+    runtime's albedo, so that it compares light and not texture filtering."""
     flicker: float = math.nan
-    """What moving the lights by a texel changes (`tuner.metrics.flicker`); NaN where it was not measured."""
+    """Change when the lights move by a texel (`tuner.metrics.flicker`); NaN if it was not measured."""
 
     def as_dict(self) -> dict[str, float]:
-        """The figures by name; flicker only where it was measured."""
+        """The metrics by name; flicker only if it was measured."""
         figures = {each.name: getattr(self, each.name) for each in fields(self)}
         if math.isnan(self.flicker):
             del figures["flicker"]
@@ -52,7 +53,7 @@ class ViewMetrics:
 
 
 def relmse(image: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:
-    """Relative mean squared error; NaN against a black reference."""
+    """Relative mean squared error, see `ViewMetrics.relmse`; NaN against a black reference."""
     errors = squared_errors(image, reference)
     return float(errors.mean()) if errors.size else math.nan
 
@@ -60,9 +61,9 @@ def relmse(image: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "p
 def trimmed_relmse(
     image: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]
 ) -> tuple[float, float]:
-    """relMSE without the worst `WORST_SHARE` of the pixels, and the share of it that those hold.
+    """relMSE without the worst `WORST_SHARE` of the pixels, and the share of the relMSE in those pixels.
 
-    One pixel is always kept. Both are NaN against a black reference, the share 0 where there is no error.
+    At least one pixel is kept. Both are NaN against a black reference. Without any error the share is 0.
     """
     errors = np.sort(squared_errors(image, reference))
     if not errors.size:
@@ -75,14 +76,14 @@ def trimmed_relmse(
 def squared_errors(
     image: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]
 ) -> Float64[np.ndarray, " measured"]:
-    """What each pixel adds to the relMSE, times their number; none against a black reference."""
+    """Squared relative error of each pixel, whose mean is the relMSE; empty against a black reference."""
     y, r = image.astype(np.float64), reference.astype(np.float64)
     denominator = r**2 + DARK_SHARE * r.mean() ** 2 if r.size else r
     return ((y - r) ** 2 / denominator).mean(axis=1) if denominator.any() else np.zeros(0)
 
 
 def median_error(image: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:
-    """The median relative error over the pixels that light reaches; NaN where it reaches none."""
+    """Median relative error over the lit pixels, see `ViewMetrics.median_error`; NaN if none is lit."""
     y, r = image.astype(np.float64), reference.astype(np.float64)
     level = r.sum(axis=1)
     lit = level > 0.0
@@ -90,7 +91,7 @@ def median_error(image: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarr
 
 
 def energy_ratio(image: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarray, "pixels 3"]) -> float:
-    """Mean of the image over mean of the reference; NaN against a black reference."""
+    """Mean of the image ÷ mean of the reference; NaN against a black reference."""
     mean = float(reference.mean(dtype=np.float64)) if reference.size else 0.0
     return float(image.mean(dtype=np.float64)) / mean if mean > 0.0 else math.nan
 
@@ -98,10 +99,10 @@ def energy_ratio(image: Float[np.ndarray, "pixels 3"], reference: Float[np.ndarr
 def hdr_flip(
     image: Float[np.ndarray, "height width 3"], reference: Float[np.ndarray, "height width 3"]
 ) -> float:
-    """Mean HDR-FLIP of two radiance images, its exposures chosen from the reference; 0 if both are black.
+    """Mean HDR-FLIP of two radiance images, in [0, 1]; 0 if both are black, 1 if only the reference is.
 
-    FLIP's exposures follow from the reference's brightest and median luminance, so both images are first
-    divided by the reference's mean: the result depends on neither light units nor scale.
+    FLIP takes its exposures from the maximum and median luminance of the reference. Both images are divided
+    by the mean of the reference first, so the result does not depend on the units or scale of the light.
     """
     return float(hdr_flip_map(image, reference).mean(dtype=np.float64))
 
@@ -109,7 +110,7 @@ def hdr_flip(
 def hdr_flip_map(
     image: Float[np.ndarray, "height width 3"], reference: Float[np.ndarray, "height width 3"]
 ) -> Float[np.ndarray, "height width"]:
-    """HDR-FLIP of every pixel, in [0, 1]; see `hdr_flip`, its mean."""
+    """HDR-FLIP of each pixel, in [0, 1]. `hdr_flip` is its mean."""
     level = float(reference.mean(dtype=np.float64))
     if level <= 0.0:
         return np.full(image.shape[:2], 1.0 if image.any() else 0.0, np.float32)
@@ -126,12 +127,14 @@ def view_metrics(
     reference_radiance: Float[np.ndarray, "height width 3"],
     valid: Bool[np.ndarray, "height width"],
 ) -> ViewMetrics:
-    """All figures of one view.
+    """All metrics of one view except flicker.
 
     Args:
-        irradiance, reference_irradiance: indirect [W/m²].
-        radiance, reference_radiance: of the whole image with one albedo [W/(m² sr)].
-        valid: the pixels that count.
+        irradiance: Indirect irradiance [W/m²].
+        reference_irradiance: Indirect irradiance of the reference [W/m²].
+        radiance: Radiance of the whole image [W/(m²·sr)].
+        reference_radiance: Radiance of the whole reference, with the albedo of `radiance` [W/(m²·sr)].
+        valid: Pixels to compare. FLIP compares all pixels.
     """
     shown, real = irradiance[valid], reference_irradiance[valid]
     trimmed, worst_share = trimmed_relmse(shown, real)
@@ -146,7 +149,7 @@ def view_metrics(
 
 
 def mean_metrics(metrics: list[ViewMetrics]) -> ViewMetrics:
-    """The mean of each figure over the views that have it; NaN where none does."""
+    """Mean of each metric over the views where it is not NaN; NaN if there are none."""
     return ViewMetrics(
         **{each.name: _mean(getattr(m, each.name) for m in metrics) for each in fields(ViewMetrics)}
     )

@@ -1,1 +1,1 @@
-"""The learnt prior: its scenes, its training, its card."""
+"""The learnt prior behind `--config auto`: its training scenes, its training, and its card."""

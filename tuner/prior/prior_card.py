@@ -1,4 +1,4 @@
-"""The card of a learnt prior: what it was trained on, how far off it is elsewhere, and where it fails."""
+"""The card of a learnt prior: training scenes, error on unseen scenes, and the scenes where it is worst."""
 
 from typing import TYPE_CHECKING
 
@@ -15,42 +15,50 @@ if TYPE_CHECKING:
     from vpltune.tuner.prior.train_prior import LearntPrior
 
 WORST = 8
-"""Scenes named as those where the prior does worst."""
+"""Number of scenes in the list of the worst. A choice."""
 
 
+# The card's template, in Markdown.
 _CARD = """# The prior behind `--config auto`
 
-Sets {parameters} in every frame, from {statistics} ratios
-that the GPU measures of what the light meets and the camera sees. Written with its config by
+The prior sets {parameters} in every frame, from {statistics} scene statistics that the GPU measures. This
+card and the config were written by
 
     {command}
 
-Trained on {scenes} scenes, {views} views each with a light position of its own, {width}×{height} pixels,
-at {counts} VPLs: {generated} generated (`tuner/prior/scene_generator.py`), the others from files.
+It was trained on {scenes} scenes at {counts} VPLs: {generated} generated (`tuner/prior/scene_generator.py`),
+the others from files. Each scene has {views} views of {width}×{height} pixels, each with its own light
+position.
 
-## On scenes that it has not seen
+## On unseen scenes
 
-Each scene was left out, in {folds} groups in turn, from a prior trained like this one. The loss is that of a
-fit (relative, robust against single pixels, through the surrogate); `fit` is the scene's own, made for its
-fitted views at that VPL count. Medians over scenes, and the share of them where `auto` is better than the
-defaults, by that loss and by relMSE alone:
+Cross-validation in {folds} groups: each scene was left out of the training of a prior like this one. The loss
+is that of a fit (relative, robust against outliers, through the surrogate). `fit` is a fit of the scene
+itself, to its fitted views at that VPL count. The table has medians over the scenes, and the share of the
+scenes where `auto` beats the defaults, by that loss and by relMSE:
 
 {figures}
 
 ## Where it fails
 
-The {worst_count} scenes with the largest loss over their own fit's, on views that neither was made for:
+The {worst_count} scenes with the largest ratio of `auto` to `fit`, on held-out views:
 
 {worst}
 
-It never leaves these ranges, in which it was trained:
+The prior never leaves these ranges, in which it was trained:
 
 {ranges}
 {left_out}"""
 
 
 def prior_card(learnt: "LearntPrior", config: TunedConfig, left_out: dict[str, str]) -> str:
-    """Markdown."""
+    """The card in Markdown.
+
+    Args:
+        learnt: The prior and the losses that it was evaluated by.
+        config: The config with the prior; its provenance names the command.
+        left_out: Reasons by the name of each scene that was not used.
+    """
     return _CARD.format(
         parameters=", ".join(parameter_spec(name).symbol for name in AUTO_PARAMETERS),
         statistics=len(STATISTIC_NAMES),
@@ -71,7 +79,7 @@ def prior_card(learnt: "LearntPrior", config: TunedConfig, left_out: dict[str, s
 
 
 def _ratio(learnt: "LearntPrior", of: str, against: str) -> np.ndarray:
-    """[scenes, counts, splits], with the noise of references as the floor of both."""
+    """Ratio of two losses [scenes, counts, splits], with `FLOOR` added to both because of noise."""
     above = {name: np.maximum(learnt.losses[name][0], 0.0) + FLOOR for name in (of, against)}
     return above[of] / above[against]
 
@@ -81,11 +89,11 @@ def _figures(learnt: "LearntPrior") -> str:
     beats = learnt.losses["auto"] < learnt.losses["default"]
     beats_in_all = learnt.losses["auto"].mean(axis=3) < learnt.losses["default"].mean(axis=3)
     lines = [
-        "| VPLs | views | auto / fit | defaults / fit | better than the defaults | by relMSE |",
+        "| VPLs | views | auto / fit | defaults / fit | auto better, by loss | by relMSE |",
         "|---|---|---|---|---|---|",
     ]
     for c, count in enumerate(learnt.fits.vpl_counts):
-        for split, views in ((0, "the fit's own"), (1, "others")):
+        for split, views in ((0, "fitted"), (1, "held out")):
             auto, plain = (np.median(values[:, c, split]) for values in (over_fit, default))
             loss, relmse = beats[:, :, c, split].mean(axis=1)
             lines.append(f"| {count} | {views} | {auto:.3f} | {plain:.3f} | {loss:.0%} | {relmse:.0%} |")

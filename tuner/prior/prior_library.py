@@ -1,6 +1,6 @@
-"""What a prior is trained on: scenes with references, each captured at several VPL counts, as loss tables.
+"""The training data of a prior: scenes with references, captured at several VPL counts, as loss tables.
 
-A scene's part is made once and kept in the user's cache folder, under all that it depends on.
+The data of each scene is computed once and cached in the user's cache folder, keyed by a hash of its inputs.
 """
 
 import hashlib
@@ -37,44 +37,52 @@ from vpltune.tuner.reference.content_key import scene_digest
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
 VIEW_SIZE = (64, 48)
+"""Width and height of the views in pixels. A choice."""
 FITTED, HELD_OUT = 2, 2
-"""Views of each scene, each with a camera and a light position of its own."""
+"""Number of views of each scene; each has its own camera and light position. A choice."""
 NOISE_TARGET, MAX_SAMPLES = 3e-3, 1024
+"""Limits of the references, see `reference_views`. A choice: coarser than the defaults there."""
 RSM_RESOLUTION = 512
+"""Texels along the side of a face of the reflective shadow map. A choice."""
 CONFIG = TunedConfig(visibility="maps", quality=Quality(rsm_resolution=RSM_RESOLUTION))
 """What scenes are captured with, at several VPL counts."""
 
+# Offsets of the point table. A choice.
 _ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.9, 0.4))
 ROTATIONS = {16: _ROTATIONS, 64: _ROTATIONS[:3], 256: _ROTATIONS[:2]}
-"""VPL counts, and the rotations of the point table that each is captured with: few VPLs are noisy, and one
-placement's noise is not to be learnt."""
+"""VPL counts, and the rotations of the point table at each. A choice: few VPLs are noisy, and the prior must
+not learn the noise of a single placement."""
 
 CAPTURE_VERSION = 3
-"""Raise whenever the same scene gives other statistics or another loss: old entries are then passed over.
-What the runtime's options and the maps' layout say is in the key by itself."""
+"""Increase it whenever a code change gives other statistics or losses for the same scene. Old cache entries
+are then ignored. The runtime's options and the layout of the maps are in the key anyway."""
 
 
-_TABLES = ("table", "relmse_table")
+_TABLES = ("table", "relmse_table")  # fields of PriorScene that are loss tables
 _TABLE_PARTS = tuple(field.name for field in fields(LossTable))
 
 
 @dataclass(frozen=True, eq=False)
 class PriorScene:
-    """One scene's captures: a row for each view, VPL count and rotation."""
+    """The captures of one scene, one row for each view, VPL count and rotation."""
 
     name: str
     statistics: Float32[np.ndarray, "rows statistics"]
     table: LossTable
-    """Of the loss that fits have."""
+    """Tables of the robust loss of a fit."""
     relmse_table: LossTable
-    """Of relMSE alone, which images are judged by."""
+    """Tables of relMSE."""
     vpl_count: Int32[np.ndarray, " rows"]
     fitted: Bool[np.ndarray, " rows"]
-    """Whether the row's view is one that a fit may see."""
+    """Whether the view is fitted; otherwise it is held out."""
 
 
 def prior_scene(scene: Scene, context: moderngl.Context) -> PriorScene:
-    """The scene's captures, from the cache or made; the scene has a camera and lights of its own.
+    """The captures of a scene, from the cache or computed.
+
+    Args:
+        scene: A scene with at least one camera and one light.
+        context: The OpenGL context to render in.
 
     Raises:
         MachineError: the GPU ran out of memory.
@@ -104,14 +112,14 @@ def prior_scene(scene: Scene, context: moderngl.Context) -> PriorScene:
 
 
 def prior_views(scene: Scene) -> tuple[View, ...]:
-    """The views that a scene is learnt from, the fitted ones first."""
+    """The views of a scene for the training, fitted views first."""
     return views_for_scene(
         scene, scene.cameras[0], scene.lights, fitted=FITTED, held_out=HELD_OUT, size=VIEW_SIZE, seed=0
     )
 
 
 def prior_references(scene: Scene, views: tuple[View, ...]) -> tuple[ReferenceView, ...]:
-    """Their references, kept in the cache like any other."""
+    """The references of these views, cached like any others."""
     return reference_views(scene, views, noise_target=NOISE_TARGET, max_samples=MAX_SAMPLES)
 
 

@@ -1,14 +1,15 @@
-"""Trains a prior on the loss tables of many scenes at once, end to end through the surrogate's loss.
+"""Train a prior on the loss tables of many scenes at once, end to end through the surrogate's loss.
 
-The prior's point for a view goes into the view's tables, and what is minimised is the mean over scenes, VPL
-counts, views and both measures, the loss that fits have and relMSE alone, of
+The tables of a view give its loss at the point that the prior predicts for it. The objective is the mean over
+scenes, VPL counts, views and two measures (the robust loss of a fit, and relMSE) of
 
     log((loss + ε)/(loss of the scene's own fit + ε)),
 
-so that no scene outweighs another, plus what is lost against the defaults where anything is, a pull towards
-them and a weight decay. Two measures, since a fit's loss lets relMSE rise where dark pixels leak: trained
-by that loss alone, a prior was worse than the defaults, by relMSE, on up to twice as many new scenes. Twin of
-the model: `renderer.config.auto_prior.AutoPrior`.
+so that all scenes have the same weight. To it are added a penalty where the prior is worse than the defaults,
+a pull towards the defaults, and weight decay. There are two measures because the loss of a fit tolerates a
+higher relMSE where light leaks into dark pixels: a prior trained by that loss alone was worse than the
+defaults, by relMSE, on up to twice as many new scenes. Twin of the model:
+`renderer.config.auto_prior.AutoPrior`.
 """
 
 from collections.abc import Iterable
@@ -23,76 +24,86 @@ from jaxtyping import Array, Bool, Float, Float32, Int32
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.auto_prior import AutoPrior
-from vpltune.tuner.prior.loss_table import HIGHEST_POINT, LOWEST_POINT, LossTable, default_point, table_loss
+from vpltune.tuner.fitting.descent import descend
+from vpltune.tuner.prior.loss_table import (
+    HIGHEST_POINT,
+    LOWEST_POINT,
+    LossTable,
+    default_point,
+    table_loss,
+    table_residuals,
+)
 from vpltune.tuner.prior.prior_library import PriorScene
 
 STEPS = 300
+"""Steps of Adam in the training. A choice."""
 LEARNING_RATE = 0.02
+"""Initial learning rate of the training. A choice."""
 REACH = np.array([0.06, 0.15, 0.2, 0.2], np.float32)
-"""How far along its axis each of `AUTO_PARAMETERS` goes, roughly: the unit of weights and pull."""
+"""Typical range of each of `AUTO_PARAMETERS` along its axis, the unit of weights and pull. A choice."""
 WEIGHT_DECAY = 0.03
-"""Of the summed squared weights: few scenes must not be learnt by heart."""
+"""Factor on the sum of the squared weights. A choice: it prevents overfitting to few scenes."""
 PULL = 0.01
-"""Of the squared distance from the defaults."""
+"""Factor on the squared distance from the defaults. A choice."""
 CAUTION = 3.0
-"""Weight of what a view loses against the defaults, beside what it loses against its fit. 1 comes a little
-closer to fits, and is worse than the defaults on more scenes."""
+"""Weight of the loss relative to the defaults against the loss relative to the fit. A choice: 1 comes
+slightly closer to the fits but is worse than the defaults on more scenes."""
 FLOOR = 0.01
-"""ε: below it, what differs between two losses is mostly the references' noise."""
-FIT_STEPS = 300
+"""ε. A choice: below it, two losses differ mostly by the noise of the references."""
 FOLDS = 8
-"""Trained at once, where scenes are left out in turn."""
+"""Groups of the cross-validation, which are trained in parallel. A choice."""
 
 DEFAULT = default_point(ArtistParameters())
+"""The point of the default parameters in the unit cube."""
+_SIZE = HIGHEST_POINT - LOWEST_POINT
 Weights = dict[str, Array]
 """`weights` [parameters, statistics] and `bias` [parameters], both in units of `REACH`."""
 
 _each = jax.vmap(jax.vmap(table_loss), in_axes=(0, None))
-"""Losses by both measures of many views, each at its own point."""
+"""Losses [measures, rows] of many views by both measures, each at its own point."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class TrainingRows:
-    """All scenes' captures one below the other."""
+    """The captures of all scenes, concatenated. The measures are the robust loss of a fit, then relMSE."""
 
     statistics: Float[Array, "rows statistics"]
     table: LossTable
-    """Of both measures, each with all rows: the fit's loss, then relMSE."""
+    """Tables [measures, rows, …]."""
     fit_loss: Float[Array, "measures rows"]
-    """Of the scene's own fit at that VPL count, at this view."""
+    """Loss of the scene's own fit at that VPL count, in this view."""
     default_loss: Float[Array, "measures rows"]
+    """Loss of the default parameters in this view."""
     weight: Float[Array, " rows"]
-    """Sums to 1 over all rows; the same for each scene, and within it for each VPL count."""
+    """Weights that sum to 1. All scenes have the same weight, and all VPL counts within a scene."""
     scene: Int32[Array, " rows"]
+    """Index of the scene."""
 
 
 @dataclass(frozen=True, eq=False)
 class OwnFits:
-    """What each scene's fit at each VPL count comes to: the best that a prior could do for it."""
+    """The fit of each scene by itself at each VPL count: the best that a prior can reach on fitted views."""
 
     vpl_counts: tuple[int, ...]
     points: Float32[np.ndarray, "scenes counts parameters"]
+    """Points in the unit cube."""
 
 
 def own_fits(scenes: tuple[PriorScene, ...], held_out: bool = False) -> OwnFits:
-    """Each scene fitted by itself at each VPL count, over all rotations at once, to its fitted views.
+    """Fit each scene by itself at each VPL count, to its fitted views in all rotations.
 
-    `held_out` fits to the other views in their stead: what a fit of these could have come to.
+    With `held_out`, fit to the held-out views instead, which gives the best possible result on those.
     """
     counts = tuple(int(count) for count in np.unique(scenes[0].vpl_count))
-    points = [np.asarray(_fitted_points(_stacked(scenes, count, not held_out))) for count in counts]
-    return OwnFits(counts, np.stack(points, axis=1))
+    points = [[_fitted_point(_rows(scene, count, not held_out)) for count in counts] for scene in scenes]
+    return OwnFits(counts, np.array(points))
 
 
-def _stacked(scenes: tuple[PriorScene, ...], vpl_count: int, fitted: bool) -> LossTable:
-    """[scenes, rows, …]: what each scene's fit at that VPL count may see."""
-    rows = [(scene.fitted == fitted) & (scene.vpl_count == vpl_count) for scene in scenes]
-    tables = [
-        jax.tree.map(lambda values, r=r: values[r], scene.table)
-        for scene, r in zip(scenes, rows, strict=True)
-    ]
-    return jax.tree.map(lambda *parts: np.stack(parts), *tables)
+def _rows(scene: PriorScene, vpl_count: int, fitted: bool) -> LossTable:
+    """The tables of the fitted or the held-out views of a scene at one VPL count."""
+    rows = (scene.fitted == fitted) & (scene.vpl_count == vpl_count)
+    return jax.tree.map(lambda values: jnp.asarray(values[rows]), scene.table)
 
 
 def _joined(tables: Iterable[LossTable]) -> LossTable:
@@ -100,7 +111,7 @@ def _joined(tables: Iterable[LossTable]) -> LossTable:
 
 
 def training_rows(scenes: tuple[PriorScene, ...], fits: OwnFits) -> TrainingRows:
-    """The rows of all scenes, with what their own fits come to."""
+    """The captures of all scenes, with the losses of the scenes' own fits and of the defaults."""
     measures = (_joined(scene.table for scene in scenes), _joined(scene.relmse_table for scene in scenes))
     table = jax.tree.map(lambda *tables: jnp.stack(tables), *measures)
     scene = np.concatenate([np.full(len(s.vpl_count), i, np.int32) for i, s in enumerate(scenes)])
@@ -120,7 +131,7 @@ def training_rows(scenes: tuple[PriorScene, ...], fits: OwnFits) -> TrainingRows
 
 
 def train(rows: TrainingRows, left_out: Bool[np.ndarray, "folds scenes"]) -> tuple[AutoPrior, ...]:
-    """A prior for each fold, which has not seen the scenes that are left out there."""
+    """Train a prior for each fold, without the scenes that are left out of it."""
     statistics = np.asarray(rows.statistics)
     center, spread = statistics.mean(axis=0), statistics.std(axis=0) + 1e-3
     normalised = jnp.asarray((statistics - center) / spread)
@@ -136,7 +147,7 @@ def train(rows: TrainingRows, left_out: Bool[np.ndarray, "folds scenes"]) -> tup
 def prior_points(
     weights: Weights, statistics: Float[Array, "rows statistics"]
 ) -> Float[Array, "rows parameters"]:
-    """The model, before it is kept in its ranges; statistics have mean 0 and deviation 1."""
+    """The model before clamping: points in the unit cube, from statistics with mean 0 and deviation 1."""
     return DEFAULT + REACH * (statistics @ weights["weights"].T + weights["bias"])
 
 
@@ -144,7 +155,7 @@ def _objective(
     weights: Weights, rows: TrainingRows, share: Array, statistics: Float[Array, "rows statistics"]
 ) -> Float[Array, ""]:
     free = prior_points(weights, statistics)
-    # Clamped in value but not in gradient: a parameter that has left its range can still come back.
+    # Clamp the value but not the gradient, so that a parameter outside its range can still return.
     points = free + jax.lax.stop_gradient(jnp.clip(free, LOWEST_POINT, HIGHEST_POINT) - free)
 
     def level(losses: Array) -> Array:
@@ -166,7 +177,7 @@ def _trained(
 ) -> Weights:
     share = jnp.where(left_out[rows.scene], 0.0, rows.weight)
     share = share / share.sum()
-    # The start is the defaults everywhere.
+    # The initial prior predicts the defaults everywhere.
     start = {"weights": jnp.zeros((len(REACH), statistics.shape[1])), "bias": jnp.zeros(len(REACH))}
     optimizer = optax.adam(optax.cosine_decay_schedule(LEARNING_RATE, STEPS))
 
@@ -181,7 +192,7 @@ def _trained(
 
 
 def _folded(weights: dict[str, np.ndarray], center: np.ndarray, spread: np.ndarray) -> AutoPrior:
-    """With normalisation, reach and defaults taken into weights and bias."""
+    """The prior with normalisation, reach and defaults folded into weights and bias."""
     slopes = REACH[:, None] * weights["weights"] / spread
     bias = DEFAULT + REACH * weights["bias"] - slopes @ center
 
@@ -191,44 +202,23 @@ def _folded(weights: dict[str, np.ndarray], center: np.ndarray, spread: np.ndarr
     return AutoPrior(rows(*slopes), *rows(bias, LOWEST_POINT, HIGHEST_POINT))
 
 
-@jax.jit
-def _fitted_points(tables: LossTable) -> Float[Array, "scenes parameters"]:
-    return jax.lax.map(_fitted_point, tables, batch_size=16)
+def _fitted_point(table: LossTable) -> Float32[np.ndarray, " parameters"]:
+    """The best of three descents over a scene's rows, from the defaults and from two shifted starts."""
+    moves = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.15, 0.3, 0.1], [0.0, 0.0, -0.2, -0.3]])
+    starts = np.clip((DEFAULT + moves - LOWEST_POINT) / _SIZE, 0.0, 1.0)
+    found = [descend(_residuals, table, start) for start in starts]
+    # `descend` is never worse than its start, so a fit is never worse than the defaults.
+    best = min(found, key=lambda descent: descent.loss)
+    return (LOWEST_POINT + best.point * _SIZE).astype(np.float32)
 
 
-def _fitted_point(table: LossTable) -> Float[Array, " parameters"]:
-    """The best of the descents from the defaults and from softer starts."""
-    moves = jnp.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.15, 0.3, 0.1], [0.0, 0.0, -0.2, -0.3]])
-    starts = jnp.clip(DEFAULT + moves, LOWEST_POINT, HIGHEST_POINT)
-    optimizer = optax.adam(optax.cosine_decay_schedule(0.02, FIT_STEPS))
-
-    def loss(point: Array) -> Array:
-        return jax.vmap(table_loss, in_axes=(0, None))(table, point).mean()
-
-    def descended(start: Array) -> tuple[Array, Array]:
-        def step(carry: tuple[Any, ...], _: None) -> tuple[Any, None]:
-            point, state, best, least = carry
-            value, gradient = jax.value_and_grad(loss)(point)
-            best, least = jnp.where(value < least, point, best), jnp.minimum(value, least)
-            updates, state = optimizer.update(gradient, state)
-            return (
-                jnp.clip(optax.apply_updates(point, updates), LOWEST_POINT, HIGHEST_POINT),
-                state,
-                best,
-                least,
-            ), None
-
-        first = (start, optimizer.init(start), start, jnp.inf)
-        (_, _, best, least), _ = jax.lax.scan(step, first, None, length=FIT_STEPS)
-        return best, least
-
-    # The defaults themselves, too: a fit is never worse than its start.
-    points, losses = jax.vmap(descended)(starts)
-    points, losses = jnp.concatenate([points, DEFAULT[None]]), jnp.append(losses, loss(jnp.asarray(DEFAULT)))
-    return points[jnp.argmin(losses)]
+def _residuals(place: Float[Array, " parameters"], table: LossTable) -> Float[Array, "rows residuals"]:
+    """At `place` in the unit cube of the tabulated part."""
+    rows = jax.vmap(table_residuals, in_axes=(0, None))(table, LOWEST_POINT + place * _SIZE)
+    return rows / np.sqrt(rows.shape[0])
 
 
 @jax.jit
 def row_losses(rows: TrainingRows, points: Float[Array, "rows parameters"]) -> Float[Array, "measures rows"]:
-    """The loss of every row by both measures, each at its point."""
+    """The loss of every row by both measures, each at its own point in the unit cube."""
     return _each(rows.table, points)

@@ -1,7 +1,7 @@
-"""Varied small scenes, by number: rooms, halls, corridors and courtyards with furniture, colours and lights.
+"""Generate varied small scenes: rooms, halls, corridors and courtyards with furniture, colours and lights.
 
-What a prior is trained on. Each has a camera and lights of its own and a scale between a hundredth and a
-hundred: nothing that is learnt may know a unit. The same seed gives the same scene, bit for bit.
+They are training scenes for a prior. Each has a camera, lights, and a random scale between 0.01 and 100, so
+that nothing learnt depends on a unit. The same number and seed give the same scene, bit for bit.
 """
 
 import math
@@ -15,9 +15,10 @@ from vpltune.renderer.scene.scene import Camera, Instance, Light, Material, Mesh
 Corner = np.ndarray | list[float]
 
 KINDS = ("room", "hall", "corridor", "courtyard", "two_rooms")
+"""Kinds of scenes; consecutive numbers cycle through them."""
 
+# The sides of the cube [-1, 1]³ as parallelograms (origin, u, v); u × v points outwards.
 _CUBE_SIDES = np.array(
-    # Outward: origin, u and v in the unit cube about the origin; u × v points out.
     [
         [[1, -1, -1], [0, 2, 0], [0, 0, 2]],
         [[-1, -1, -1], [0, 0, 2], [0, 2, 0]],
@@ -32,7 +33,7 @@ _CUBE_SIDES = np.array(
 
 @dataclass
 class _Builder:
-    """Meshes and materials as they come, and the boxes in which nothing else may stand."""
+    """The meshes and materials so far, and the bounding boxes that are taken."""
 
     random: np.random.Generator
     meshes: list[Mesh] = field(default_factory=list)
@@ -40,7 +41,7 @@ class _Builder:
     taken: list[Float64[np.ndarray, "2 3"]] = field(default_factory=list)
 
     def material(self, grey: bool = False) -> int:
-        """A new colour: a wall's is light and pale, a thing's is any."""
+        """Add a random material, light and pale if `grey`, else of any colour, and return its index."""
         level, tint = (self.random.uniform(0.5, 0.85), 0.1) if grey else (self.random.uniform(0.1, 0.8), 0.9)
         hue = self.random.uniform(1.0 - tint, 1.0, 3)
         color = np.clip(level * hue / hue.max(), 0.02, 0.9).astype(np.float32)
@@ -48,7 +49,7 @@ class _Builder:
         return len(self.materials) - 1
 
     def quads(self, name: str, corners: Float64[np.ndarray, "quads 3 3"], material: int) -> None:
-        """Parallelograms (origin, u, v); their normals are u × v."""
+        """Add a mesh of parallelograms (origin, u, v) with normals u × v."""
         origin, u, v = corners[:, 0], corners[:, 1], corners[:, 2]
         normals = np.cross(u, v)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -76,7 +77,7 @@ class _Builder:
         turn: float = 0.0,
         kept: bool = True,
     ) -> None:
-        """A closed box, turned about its vertical axis by `turn` radians."""
+        """Add a closed box, turned about its vertical axis by `turn` radians; `kept` boxes count as taken."""
         low, high = np.asarray(low, np.float64), np.asarray(high, np.float64)
         center, half = (low + high) / 2.0, (high - low) / 2.0
         c, s = math.cos(turn), math.sin(turn)
@@ -89,10 +90,11 @@ class _Builder:
             self.taken.append(np.stack([center - reach, center + reach]))
 
     def free(self, point: Float64[np.ndarray, "3"], room: float) -> bool:
+        """Whether `point` is outside every taken box, each enlarged by `room` on all sides."""
         return all((point < box[0] - room).any() or (point > box[1] + room).any() for box in self.taken)
 
     def free_point(self, low: np.ndarray, high: np.ndarray, room: float) -> Float64[np.ndarray, "3"]:
-        """A point with that much room to the next box, if one is found; else the last tried."""
+        """A random point between `low` and `high` that is `free`, or the last of 64 tries."""
         for _ in range(64):
             point = self.random.uniform(low, high)
             if self.free(point, room):
@@ -101,12 +103,12 @@ class _Builder:
 
 
 def generated_name(number: int) -> str:
-    """What the scene of that number is called: by its kind."""
+    """The name of a generated scene: its kind and number."""
     return f"{KINDS[number % len(KINDS)]}-{number:03d}"
 
 
 def generated_scene(number: int, seed: int = 0) -> Scene:
-    """The scene of that number, with one camera and one light or two; the kinds take turns."""
+    """The scene with this number, with one camera and one or two lights. Its kind is `KINDS[number % 5]`."""
     random = np.random.default_rng([seed, number])
     kind = KINDS[number % len(KINDS)]
     width, height, depth = _size(kind, random)
@@ -125,7 +127,7 @@ def generated_scene(number: int, seed: int = 0) -> Scene:
 
 
 def _scene(name: str, builder: _Builder) -> Scene:
-    """Each mesh placed once, as it is."""
+    """A scene with one untransformed instance of each mesh."""
     return Scene(
         name=name,
         meshes=tuple(builder.meshes),
@@ -135,7 +137,7 @@ def _scene(name: str, builder: _Builder) -> Scene:
 
 
 def _size(kind: str, random: np.random.Generator) -> tuple[float, float, float]:
-    """Width, height and depth; a room is about as large as a room, before it is scaled."""
+    """Width, height and depth in metres, before the scene is scaled."""
     if kind == "corridor":
         return random.uniform(1.2, 2.0), random.uniform(2.2, 3.0), random.uniform(7.0, 12.0)
     if kind in ("hall", "courtyard"):
@@ -144,7 +146,10 @@ def _size(kind: str, random: np.random.Generator) -> tuple[float, float, float]:
 
 
 def _shell(builder: _Builder, kind: str, low: np.ndarray, high: np.ndarray, without: str = "") -> None:
-    """Floor, walls and, but over a courtyard, a ceiling, all turned inwards; now and then in colours."""
+    """Add floor, walls and ceiling, all facing inwards. Each has its own colour with a probability of 0.4.
+
+    A courtyard has no ceiling, and the side named `without` is left out.
+    """
     size = high - low
     x, y, z = np.diag(size)
     walls = {
@@ -164,7 +169,7 @@ def _shell(builder: _Builder, kind: str, low: np.ndarray, high: np.ndarray, with
 
 
 def _partition(builder: _Builder, low: np.ndarray, high: np.ndarray) -> None:
-    """A wall across, with a doorway."""
+    """Add a wall with a doorway across the room."""
     random, material = builder.random, builder.material(grey=True)
     z = random.uniform(0.4, 0.6) * (high[2] - low[2]) + low[2]
     thickness = random.uniform(0.05, 0.2)
@@ -180,7 +185,7 @@ def _partition(builder: _Builder, low: np.ndarray, high: np.ndarray) -> None:
 
 
 def _columns(builder: _Builder, low: np.ndarray, high: np.ndarray) -> None:
-    """Two rows of them."""
+    """Add two rows of columns."""
     random, material = builder.random, builder.material(grey=True)
     side, count = random.uniform(0.25, 0.6), int(random.integers(2, 5))
     inset = random.uniform(0.18, 0.3) * (high[0] - low[0])
@@ -192,7 +197,7 @@ def _columns(builder: _Builder, low: np.ndarray, high: np.ndarray) -> None:
 
 
 def _furnish(builder: _Builder, low: np.ndarray, high: np.ndarray) -> None:
-    """Crates, tables, shelves and boards, where nothing else stands."""
+    """Add crates, tables, shelves and boards at free places."""
     random = builder.random
     floor = (high[0] - low[0]) * (high[2] - low[2])
     for _ in range(int(random.integers(2, 5 + min(10, floor / 8.0)))):
@@ -259,7 +264,7 @@ def _board(builder: _Builder, place: np.ndarray, reach: float, height: float, tu
 
 
 def _camera(builder: _Builder, low: np.ndarray, high: np.ndarray) -> Camera:
-    """From near one end, at eye height, towards the other."""
+    """A camera near one end that looks towards the other."""
     size = high - low
     near = low + size * [0.1, 0.4, 0.8]
     eye = builder.free_point(near, low + size * [0.9, 0.7, 0.95], 0.05 * size.min())
@@ -268,7 +273,7 @@ def _camera(builder: _Builder, low: np.ndarray, high: np.ndarray) -> Camera:
 
 
 def _lights(builder: _Builder, kind: str, low: np.ndarray, high: np.ndarray) -> tuple[Light, ...]:
-    """A sun over a courtyard; elsewhere a spot at whatever it meets, a lamp, or one of each."""
+    """A directional light in a courtyard; elsewhere a spot light, a point light, or one of each."""
     random, size = builder.random, high - low
     power = float(size @ size)
     if kind == "courtyard":
@@ -279,7 +284,7 @@ def _lights(builder: _Builder, kind: str, low: np.ndarray, high: np.ndarray) -> 
         low + size * [0.15, 0.4, 0.15], low + size * [0.85, 0.9, 0.85], 0.05 * size.min()
     )
     target = random.uniform(low + size * [0.1, 0.0, 0.1], low + size * [0.9, 0.7, 0.9])
-    # Not along its own length's worth of nothing: a target at the light itself gives no direction.
+    # A target too close to the light gives no usable direction.
     towards = (
         target - place if np.linalg.norm(target - place) > 0.1 * size.min() else np.array([0.0, -1.0, 0.0])
     )
@@ -303,7 +308,7 @@ def _tint(random: np.random.Generator) -> Float64[np.ndarray, "3"]:
 
 
 def room_and_hall() -> Scene:
-    """A small room at z > 0 and a hall at z < 0, with a door between them about x = 0: fixed, not drawn."""
+    """A fixed scene: a small room at z > 0 and a hall at z < 0, with a doorway between them at x = 0."""
     builder = _Builder(np.random.default_rng(7))
     room_low, room_high = np.array([-1.6, 0.0, 0.0]), np.array([1.6, 2.5, 5.0])
     hall_low, hall_high = np.array([-7.0, 0.0, -16.0]), np.array([7.0, 6.5, 0.0])

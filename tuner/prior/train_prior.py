@@ -1,4 +1,4 @@
-"""Trains the prior that ships as `auto`: scenes in, a config with its card out."""
+"""Train a prior for `--config auto`: from scenes to a config and its card."""
 
 import importlib.metadata
 from collections.abc import Callable, Mapping
@@ -39,22 +39,24 @@ from vpltune.tuner.surrogate.compiled_functions import keep_compiled_functions
 
 @dataclass(frozen=True, eq=False)
 class LearntPrior:
-    """A prior of all scenes, and for each scene one that has not seen it."""
+    """A prior trained on all scenes, and for each scene a prior trained without it."""
 
     scenes: tuple[PriorScene, ...]
     fits: OwnFits
     prior: AutoPrior
+    """Trained on all scenes."""
     unseen: tuple[AutoPrior, ...]
     """For each scene, the prior of the fold that leaves it out."""
     losses: dict[str, Float64[np.ndarray, "measures scenes counts splits"]]
-    """Of `auto` (the unseen prior), `fit` (the scene's own) and `default`; measures: the fit's loss, relMSE;
-    splits: fitted, held out."""
+    """Mean losses of `auto` (the prior from `unseen`), `fit` (the scene's own fit) and `default`. The
+    measures are the robust loss of a fit and relMSE; the splits are fitted and held-out views."""
 
 
 def learn_prior(scenes: tuple[PriorScene, ...], progress: Progress) -> LearntPrior:
-    """Fit each scene by itself, train on all, and train once more with every scene left out in turn.
+    """Fit each scene by itself, train a prior on all scenes, and cross-validate it in `FOLDS` groups.
 
-    Scenes are left out in `FOLDS` groups, which is harder than one by one: less is left to learn from.
+    Leaving out groups is a harder test than leaving out single scenes, because fewer scenes remain for
+    training.
     """
     progress("each scene's own fit", 0.0)
     fits = own_fits(scenes)
@@ -71,14 +73,26 @@ def learn_prior(scenes: tuple[PriorScene, ...], progress: Progress) -> LearntPri
 def train_prior(
     library: Path | None, generated: int, seed: int, output: Path, command: str | None, progress: Progress
 ) -> dict[str, Any]:
-    """Learn from `generated` scenes and those of a library; write the config, and its card beside it as .md.
+    """Train a prior on generated scenes and those of a library; write the config and its card.
 
-    Captures and references are kept in the user's cache, so that what was stopped goes on where it was. A
-    scene of the library that cannot be read, or in which nothing is lit, is left out and named.
+    The card is a Markdown file beside the config. Captures and references are cached, so an interrupted run
+    continues where it stopped. A scene that cannot be read, or with an unlit view, is left out and named in
+    the result.
+
+    Args:
+        library: Folder or list of scenes; None for generated scenes only.
+        generated: Number of generated scenes.
+        seed: Seed of the generated scenes.
+        output: Path of the config.
+        command: The command line, for the record.
+        progress: Called with the stage and the share of it that is done.
+
+    Returns:
+        The document that `vpltune train-prior --json` prints.
 
     Raises:
-        InputError: the library cannot be read, or no scene is left.
-        MachineError: no OpenGL.
+        InputError: the library cannot be read, or fewer than `FOLDS` scenes are usable.
+        MachineError: there is no OpenGL.
     """
     keep_compiled_functions()
     scenes, left_out = collected_scenes(scene_sources(library, generated, seed), progress)
@@ -105,7 +119,7 @@ def train_prior(
 
 
 def scene_sources(library: Path | None, generated: int, seed: int) -> dict[str, Callable[[], Scene]]:
-    """Name to what makes or reads the scene, with a camera and lights.
+    """Map the name of each scene to a function that generates or reads it, with a camera and lights.
 
     Raises:
         InputError: the library cannot be read, or has no scene.
@@ -118,12 +132,13 @@ def scene_sources(library: Path | None, generated: int, seed: int) -> dict[str, 
 def collected_scenes(
     sources: Mapping[str, Callable[[], Scene]], progress: Progress
 ) -> tuple[tuple[PriorScene, ...], dict[str, str]]:
-    """The captures of all scenes, and by name why some have none.
+    """The captures of all usable scenes, and the reason for each scene left out, by name.
 
     Raises:
-        MachineError: no OpenGL.
+        MachineError: there is no OpenGL, or the GPU ran out of memory.
     """
-    # One for all: those that runtimes make for themselves kept some 80 MiB a scene until the process ended.
+    # One context for all scenes: contexts that the runtimes created kept some 80 MiB each until the process
+    # ended.
     context = create_context()
     found: list[PriorScene] = []
     left_out: dict[str, str] = {}
@@ -134,7 +149,7 @@ def collected_scenes(
         except InputError as error:
             left_out[name] = str(error).rpartition(f"{name}: ")[2]
             continue
-        # A view in which no light arrives has nothing to teach, and makes a mean over views meaningless.
+        # An unlit view teaches nothing and makes a mean over views meaningless.
         if (scene.table.square.max(axis=(1, 2, 3)) > 0.0).all():
             found.append(scene)
         else:
@@ -143,7 +158,7 @@ def collected_scenes(
 
 
 def library_scene(path: Path, name: str) -> Scene:
-    """A scene with the camera and the lights that a fit would give it.
+    """Read a scene and give it the camera and the lights that a fit would use.
 
     Raises:
         InputError: the scene or its sidecar cannot be used.

@@ -1,4 +1,4 @@
-"""The reference: what one bounce of indirect light really is, path-traced with Mitsuba."""
+"""Ground truth for a fit: one bounce of indirect light, path-traced with Mitsuba."""
 
 from vpltune.tuner.reference.reference_view import ReferenceView, noise_floor
 from vpltune.tuner.reference.references import reference_views
@@ -15,7 +15,7 @@ __all__ = [
 
 
 def __getattr__(name: str):
-    # `visibility` loads Mitsuba, which the names above do not.
+    # Imported on first use: `visibility` loads Mitsuba, the modules above do not.
     if name == "ray_traced_visibility":
         from vpltune.tuner.reference.visibility import ray_traced_visibility
 

@@ -1,4 +1,4 @@
-"""References kept in the user's cache folder, found again by what they were made from."""
+"""On-disk cache of references, in the user's cache folder, keyed by a hash of their inputs."""
 
 import contextlib
 import fcntl
@@ -18,26 +18,27 @@ from vpltune.renderer.files.atomic_file import written_whole
 from vpltune.tuner.reference.reference_view import ReferenceView
 
 SIZE_LIMIT = 2 * 2**30
-"""Bytes kept; beyond them, the entries that were not used for longest go."""
+"""Size of the cache in bytes. Above it, the least recently used entries are deleted. A choice: 2 GiB."""
 
 LOOK_SHARE = 1 / 64
-"""Of the limit, that a process stores between two looks at the size of the folder: each asks for the size of
-every entry, and a thousand processes on one file server would do nothing else."""
+"""A process checks the size of the cache each time it has stored this share of `SIZE_LIMIT`. A choice: a
+check queries the size of every entry, so checking at each store would overload a file server that many
+processes share."""
 
-_SUFFIX = ".reference"
-_DIGEST_BYTES = 32
+_SUFFIX = ".reference"  # file name extension of a cache entry
+_DIGEST_BYTES = 32  # length of a SHA-256 digest
 _log = logging.getLogger(__name__)
 _stored_bytes = 0
 
 
 def cache_folder() -> Path:
-    """The folder named by the environment variable VPLTUNE_CACHE, else the user's own for this program."""
+    """The folder that the environment variable VPLTUNE_CACHE names, else vpltune's in the user's cache."""
     named = os.environ.get("VPLTUNE_CACHE")
     return Path(named) if named else Path(platformdirs.user_cache_dir("vpltune", appauthor=False))
 
 
 def load(key: str) -> ReferenceView | None:
-    """The entry of `key`, or None where there is none or it is not what was written under that key."""
+    """The reference stored under `key`, or None if there is none or its checksum does not match."""
     path = _path(key)
     try:
         data = path.read_bytes()
@@ -45,19 +46,20 @@ def load(key: str) -> ReferenceView | None:
         return None
     payload = data[_DIGEST_BYTES:]
     if _digest(key, payload) != data[:_DIGEST_BYTES]:
-        _log.warning("%s: damaged, made again", path)
+        _log.warning("%s: damaged cache entry, rendered again", path)
         return None
     with contextlib.suppress(OSError):
         os.utime(path)
+    _log.debug("reference read from %s", path)
     with np.load(io.BytesIO(payload), allow_pickle=False) as arrays:
         found = {name: arrays[name] for name in arrays.files}
     return ReferenceView(**{name: a if a.ndim else a.item() for name, a in found.items()})
 
 
 def store(key: str, reference: ReferenceView) -> None:
-    """Keep `reference` under `key`, whole or not at all; a folder that cannot be written to is no error.
+    """Store `reference` under `key`, atomically. The caller holds `locked(key)`.
 
-    Whoever stores holds `locked(key)`.
+    A folder that cannot be written to is logged as a warning; it raises nothing.
     """
     global _stored_bytes
     arrays = {field.name: np.asarray(getattr(reference, field.name)) for field in fields(reference)}
@@ -66,23 +68,25 @@ def store(key: str, reference: ReferenceView) -> None:
     payload = buffer.getvalue()
     path = _path(key)
     try:
-        for leftover in path.parent.glob(f".{key}-*{_SUFFIX}"):  # of a process killed while it wrote
+        for leftover in path.parent.glob(f".{key}-*{_SUFFIX}"):  # from a process killed while writing
             leftover.unlink(missing_ok=True)
         with written_whole(path) as temporary:
             temporary.write_bytes(_digest(key, payload) + payload)
+        _log.debug("reference kept in %s", path)
         _stored_bytes += len(payload)
         if _stored_bytes > LOOK_SHARE * SIZE_LIMIT:
             _stored_bytes = 0
             _drop_oldest()
     except (OSError, InputError) as error:
-        _log.warning("references are not kept: %s", error)
+        _log.warning("reference not cached: %s", error)
 
 
 @contextlib.contextmanager
 def locked(key: str) -> Iterator[None]:
-    """Hold `key` alone among processes, so that none makes what another is making.
+    """Lock `key` against other processes, so that no two render the same reference.
 
-    The lock is the kernel's own and ends with its process, however that ends.
+    The kernel releases the lock when the process ends, even if it is killed. Where the file system has no
+    locks, the block runs without one.
     """
     path = _path(key).with_suffix(".lock")
     handle = _lock(path)
@@ -92,13 +96,14 @@ def locked(key: str) -> Iterator[None]:
     try:
         yield
     finally:
-        # Unlinked while held: no lock files pile up, and whoever waits on this one sees that it is gone.
+        # Unlink while holding the lock: lock files do not pile up, and a process that waits for this one
+        # notices that the file is gone.
         path.unlink(missing_ok=True)
         os.close(handle)
 
 
 def remove_leftovers() -> None:
-    """Remove what killed processes left in the folder: locks that nobody holds, files half written."""
+    """Delete what killed processes left in the cache: locks nobody holds and half-written files."""
     folder = _path("").parent
     for path in [*folder.glob("*.lock"), *folder.glob(f".*{_SUFFIX}")]:
         key = path.stem.removeprefix(".").partition("-")[0]
@@ -110,7 +115,10 @@ def remove_leftovers() -> None:
 
 
 def _lock(path: Path, wait: bool = True) -> int | None:
-    """An open file that holds the lock; None where none can be had, or another process has it."""
+    """A file descriptor that holds the lock.
+
+    None if the file cannot be opened, or if another process holds the lock and `wait` is false.
+    """
     while True:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -123,8 +131,8 @@ def _lock(path: Path, wait: bool = True) -> int | None:
             os.close(handle)
             return None
         except OSError:
-            pass  # some network file systems cannot lock
-        # A lock on a file that its last holder unlinked keeps nobody off.
+            pass  # some network file systems have no locks
+        # The last holder may have unlinked this file. A lock on it then excludes nobody: open the new one.
         with contextlib.suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(handle), path.stat()):
                 return handle
@@ -132,7 +140,7 @@ def _lock(path: Path, wait: bool = True) -> int | None:
 
 
 def _digest(key: str, payload: bytes) -> bytes:
-    # The key too: an entry under another's name is as wrong as a torn one.
+    # The key is hashed too, so that an entry renamed to another key counts as damaged.
     return hashlib.sha256(key.encode() + payload).digest()
 
 

@@ -1,4 +1,4 @@
-"""What a reference is made from, as one hash: two keys are equal when the references are."""
+"""Cache keys: one hash over everything that a reference is computed from."""
 
 import hashlib
 import importlib.metadata
@@ -10,11 +10,12 @@ from vpltune.renderer.scene.scene import Scene
 from vpltune.renderer.scene.views import View, light_to_json
 
 ESTIMATOR_VERSION = 1
-"""Raise whenever the estimator gives other numbers from the same scene: old entries are then passed over."""
+"""Increase it whenever a code change makes the estimator return different values for the same input. Entries
+of older versions are then ignored."""
 
 
 def scene_digest(scene: Scene) -> str:
-    """Hash of a scene's geometry, materials and textures; of no names, and of no light or camera."""
+    """Hex SHA-256 of a scene's geometry, materials and textures, without names, lights and cameras."""
     digest = hashlib.sha256()
     for mesh in scene.meshes:
         for array in (mesh.positions, mesh.normals, mesh.uv, mesh.colors, mesh.triangles):
@@ -42,7 +43,11 @@ def reference_key(
     bounces: int | None,
     variant: str,
 ) -> str:
-    """Hash of all that a view's reference depends on; `scene_hash` is `scene_digest`'s."""
+    """Hex SHA-256 of everything that a view's reference depends on.
+
+    `scene_hash` comes from `scene_digest`, `variant` is the name of the Mitsuba variant. The other arguments
+    are those of `reference_views`.
+    """
     content = {
         "scene": scene_hash,
         "camera": [view.camera.to_world.ravel().tolist(), view.camera.yfov],
@@ -60,6 +65,7 @@ def reference_key(
 
 
 def _add_array(digest, array: np.ndarray) -> None:
-    # Shape and type too: otherwise numbers could move from one array to the next unseen.
+    # Hash the shape and dtype too: otherwise values could move from one array to the next without changing
+    # the hash.
     digest.update(f"{array.dtype.str}{array.shape};".encode())
     digest.update(np.ascontiguousarray(array).data)

@@ -1,28 +1,31 @@
-"""Random directions and points about an axis, from two numbers in [0, 1)."""
+"""Sampling directions and points about an axis, each from two numbers in [0, 1).
+
+Axes and results are one vector per lane of the wavefront, of unit length unless stated otherwise.
+"""
 
 import math
 
 
 def cosine_direction(wavefront, normal, u, v):
-    """Density cos θ/π about a unit normal."""
+    """A direction with density cos θ/π per steradian about a unit normal."""
     return _about(wavefront, normal, wavefront.sqrt(1.0 - u), wavefront.sqrt(u), v)
 
 
 def cone_direction(wavefront, axis, least_cosine, u, v):
-    """Uniform over the solid angle where cos θ ≥ `least_cosine`, 2π(1 − least_cosine) steradians."""
+    """A direction uniform over the cone cos θ ≥ `least_cosine`, of 2π(1 − least_cosine) steradians."""
     w = wavefront
-    # 1 − cos θ, not cos θ, is what stays exact in a narrow cone.
+    # Work with 1 − cos θ: in a narrow cone cos θ itself would lose its digits to rounding.
     drop = u * (1.0 - least_cosine)
     return _about(w, axis, 1.0 - drop, w.sqrt(drop * (2.0 - drop)), v)
 
 
 def disc_point(wavefront, axis, u, v):
-    """Uniform over the unit disc across a unit axis."""
+    """A point uniform over the unit disc that is centred at the origin and perpendicular to a unit axis."""
     return _about(wavefront, axis, 0.0, wavefront.sqrt(u), v)
 
 
 def _about(wavefront, axis, along, across, turn):
-    """`along` the axis and `across` it, `turn` of the way round.
+    """The vector with cylindrical coordinates about `axis`: height `along`, radius `across`, angle 2π·`turn`.
 
     Basis: Duff et al. (2017), "Building an Orthonormal Basis, Revisited", listing 3.
     """

@@ -1,15 +1,15 @@
-"""Indirect irradiance at the centre of every pixel: final gathering met half-way by paths from the lights.
+"""Indirect irradiance at every pixel centre: final gathering combined with paths from the lights.
 
-    E_ind(x) = ∫ L(x, ω) cos θ dω,    L(x, ω) = ρ(y)/π · (E_direct(y) + E_ind(y)),    y = x → ω
+    E_ind(x) = ∫ L(x, ω) cos θ dω,    L(x, ω) = ρ(y)/π · (E_direct(y) + E_ind(y))
 
-One bounce stops at E_direct(y). Two strategies find y: a direction drawn from cos θ/π about the normal of x,
-and a path from one of the lights, which finds what a narrow beam hits. Their estimates are added with the
-balance heuristic (Veach and Guibas 1995, "Optimally Combining Sampling Techniques", eq. 9), so that
-E_ind is sampled without bias and near corners without spikes. No albedo of x is divided out: receivers
-that reflect nothing are as good as others. A path tracer's depth 3 minus depth 2 has the same expectation.
+y is the surface that x sees along ω. For one bounce, E_ind(y) is left out. Two strategies sample y: a
+cosine-weighted direction from x, and a path from one of the lights, which finds the spots that narrow beams
+light. The balance heuristic combines them (Veach and Guibas 1995, "Optimally Combining Sampling Techniques",
+eq. 9). The sum is unbiased and has no spikes near corners. The albedo of x is never divided out, so black
+receivers are as accurate as others. A path tracer's depth 3 minus depth 2 has the same expectation.
 
-Surfaces are two-sided and reflect diffusely about their shading normals, as Mitsuba's `twosided`
-`diffuse` does: light counts where it comes from the side of the shading normal that is seen.
+Surfaces are two-sided and diffuse about their shading normals, like Mitsuba's `twosided` `diffuse`: light
+counts if it arrives on the visible side of the shading normal.
 """
 
 import math
@@ -28,36 +28,39 @@ from vpltune.tuner.reference.surfaces import Surface, Surfaces
 from vpltune.tuner.reference.unit_triangles import UnitTriangles
 
 LANE_SAMPLES_PER_LAUNCH = 2**21
-"""Bounds the time of one kernel to a second or so: progress and interrupts come between kernels."""
+"""Lanes times samples in one kernel. A choice: a kernel then takes about a second, and progress reports and
+interrupts have to wait for the end of a kernel."""
 
 ROULETTE_DEPTH = 3
-"""Paths of this many bounces or more live on with a probability of their albedo, at most …"""
+"""Russian roulette starts after this many bounces. A choice: it does not change the expectation."""
 ROULETTE_SURVIVAL = 0.95
+"""Upper limit on the survival probability, else the throughput's largest component. A choice."""
 BOUNCE_LIMIT = 64
-"""… and end here for good, which bounds the time in a scene that absorbs nothing."""
+"""Every path ends here. A choice: it bounds the time in scenes that absorb nothing."""
 
-_SEEDS = 5
-_NUMBERS_PER_VERTEX = 6
+_SEEDS = 5  # per pixel: one scramble for each number of the first vertex, and one seed for the hash
+_NUMBERS_PER_VERTEX = 6  # light, roulette, direction (2), light path (2)
 
 
 @dataclass(frozen=True, eq=False)
 class PrimaryHits:
-    """What the pixel centres see, and the direct irradiance there."""
+    """The surfaces seen at the pixel centres. Every array is zero where a pixel sees none."""
 
     valid: Bool[np.ndarray, "height width"]
     position_world: Float64[np.ndarray, "height width 3"]
     normal_world: Float32[np.ndarray, "height width 3"]
-    """Shading normals, turned towards the eye."""
+    """Shading normals of unit length, flipped towards the camera."""
     albedo: Float32[np.ndarray, "height width 3"]
     direct_irradiance: Float32[np.ndarray, "height width 3"]
+    """W/m², with shadows."""
 
 
 class IndirectIrradiance:
-    """The estimator for one view: primary hits at once, indirect irradiance a batch of samples at a time.
+    """Estimator for one view. The constructor traces the primary hits; `batches` samples indirect irradiance.
 
-    Two halves are sampled, each with its own randomisation of the same low-discrepancy points: they are
-    independent, and each is unbiased at any number of samples. Lanes are the pixels of the first half,
-    then those of the second.
+    There are two independent estimates, called halves. Each randomises the same low-discrepancy points in its
+    own way and is unbiased for any sample count. The lanes are the pixels of the first half, then those of
+    the second.
     """
 
     def __init__(self, wavefront, surfaces: Surfaces, triangles: UnitTriangles, view: View):
@@ -96,9 +99,16 @@ class IndirectIrradiance:
     def batches(
         self, first: int, count: int, seed: int, bounces: int | None
     ) -> Iterator[tuple[int, Float32[np.ndarray, "2 height width 3"]]]:
-        """Samples `first` … `first` + `count` − 1 of both halves, some at a time: (samples, their sum).
+        """Take samples `first` … `first` + `count` − 1 of both halves, one kernel at a time.
 
-        `bounces` is the number of reflections that light makes before it arrives, None for any.
+        Args:
+            first: Index of the first sample.
+            count: Samples per pixel and half.
+            seed: Seed of both halves' randomisation.
+            bounces: Reflections before light arrives at the receiver; None for up to `BOUNCE_LIMIT`.
+
+        Yields:
+            Samples taken by one kernel, and their sum for each half in W/m².
         """
         w = self._wavefront
         width, height = self._size
@@ -132,7 +142,8 @@ class IndirectIrradiance:
     def _arriving(self, first_numbers, stream, seed, limit):
         """One sample of the indirect irradiance (W/m²) at the pixel centres.
 
-        The first vertex draws its two directions from `first_numbers`; all else is hashed from `stream`.
+        The first vertex takes its cosine-weighted direction and its light path from `first_numbers`. All
+        other random numbers are hashed from `stream`.
         """
         w = self._wavefront
 
@@ -165,7 +176,8 @@ class IndirectIrradiance:
         return w.loop(lambda depth, alive, *_: alive, bounce, state)[-1]
 
     def _from_cosine_direction(self, x: Surface, alive, u, v):
-        """What a cosine-weighted direction from x meets, and the direct irradiance there, weighted."""
+        """The surface y along a cosine-weighted direction from x, and the direct irradiance at y times the
+        weight of the balance heuristic."""
         w = self._wavefront
         direction = cosine_direction(w, x.shading_normal, u, v)
         y = self._surfaces.first_along(x.ray_origin(w, direction), direction, alive)
@@ -173,13 +185,13 @@ class IndirectIrradiance:
         count = w.to_number(self._lights.count)
 
         def balance(paths):
-            # 1e-30: where both densities are zero nothing arrives either.
+            # 1e-30 only avoids 0/0: where both densities are zero, no light arrives.
             return density / w.maximum(density + paths / count, 1e-30)
 
         return y, self._lights.irradiance(y, alive & y.hit, balance)
 
     def _from_light_path(self, x: Surface, alive, chosen, u, v):
-        """What the end of a path from one light brings to x (W/m²), weighted."""
+        """Contribution to x (W/m²) of a path from a random light, times the balance heuristic's weight."""
         w = self._wavefront
         count = w.to_number(self._lights.count)
         light = w.to_index(w.minimum(w.floor(chosen * count), w.maximum(count - 1.0, 0.0)))
@@ -193,13 +205,13 @@ class IndirectIrradiance:
         facing = alive & y.hit & facing & (density > 0.0)
         start = y.ray_origin(w, to_x)
         visible = facing & ~w.occluded(start, x.ray_origin(w, -to_x) - start, 1.0, facing)
-        # ρ/π·E·geometry over the density of light paths, times their weight: that density cancels.
+        # ρ/π · E · geometry ÷ (light-path density) × weight. The density of light paths cancels.
         scale = density / w.maximum(density + paths / count, 1e-30)
         return w.where(visible, y.albedo * irradiance * scale, 0.0)
 
 
 def _cosine_density(wavefront, x: Surface, y: Surface):
-    """Density per area at y of cosine-weighted directions from x: max(0, cos θ_x)·|cos θ_y|/(π·d²)."""
+    """Density per unit area at y of cosine-weighted directions from x: max(0, cos θ_x)·|cos θ_y|/(π·d²)."""
     w = wavefront
     to_y = y.position - x.position
     squared = w.maximum(w.dot(to_y, to_y), 1e-20)
@@ -209,6 +221,6 @@ def _cosine_density(wavefront, x: Surface, y: Surface):
 
 
 def _pixel_seeds(seed: int, half: int, pixels: int) -> UInt32[np.ndarray, "pixels 5"]:
-    """For each pixel: the scrambles of the first vertex's four numbers, and the seed of all others."""
+    """For each pixel, four scrambles for the numbers of the first vertex and one seed for all others."""
     rng = np.random.default_rng([seed, half])
     return rng.integers(0, 2**32, (pixels, _SEEDS), dtype=np.uint32)

@@ -1,7 +1,7 @@
-"""Array arithmetic and ray casts on Dr.Jit's LLVM backend: a whole estimator becomes one fused kernel.
+"""Array arithmetic and ray casts on Dr.Jit's LLVM backend, which fuses a whole estimator into one kernel.
 
-`LlvmWavefront` and `NumpyWavefront` offer the same methods, so that the estimator is written once.
-An array is one number per lane, a vector three of them, a table a flat buffer to look numbers up in.
+`LlvmWavefront` and `NumpyWavefront` have the same methods, so the estimator is written once. An *array* holds
+one number per lane, a *vector* three. A *table* is a flat buffer for lookups.
 """
 
 from collections.abc import Callable
@@ -19,76 +19,86 @@ Vector = Any
 
 
 class LlvmWavefront:
-    """Rays against one scene's triangles, many lanes at once."""
+    """Arithmetic on many lanes at once, and rays against the triangles of one scene."""
 
     def __init__(self, triangles: UnitTriangles):
         self._scene = mitsuba_scene(triangles, mi.Float, mi.UInt32)
 
     def table(self, values: Float32[np.ndarray, "*n"] | UInt32[np.ndarray, "*n"]) -> Array:
-        """Numbers to look up, or one per lane; a table of one number is the same for all lanes."""
+        """A flat copy of `values`. Used as an array, a table of one number broadcasts to all lanes."""
         kind = mi.UInt32 if values.dtype == np.uint32 else mi.Float
         return kind(np.ascontiguousarray(values).ravel())
 
     def vectors(self, values: Float[np.ndarray, "lanes 3"]) -> Vector:
-        """One vector per lane."""
+        """One vector per lane, as float32."""
         return mi.Vector3f(np.ascontiguousarray(values.T, dtype=np.float32))
 
     def take(self, table: Array, index: Array) -> Array:
+        """The number at `index` of a table, for each lane."""
         return dr.gather(type(table), table, index)
 
     def take_vector(self, table: Array, index: Array) -> Vector:
-        """Numbers 3·index, 3·index + 1 and 3·index + 2."""
+        """The vector at `index` of a table: numbers 3·index, 3·index + 1 and 3·index + 2."""
         return dr.gather(mi.Vector3f if type(table) is mi.Float else mi.Vector3u, table, index)
 
     def loop(self, condition: Callable[..., Any], body: Callable[..., tuple], state: tuple) -> tuple:
-        """While `condition(*state)`, `state = body(*state)`; a lane that is done stands still."""
+        """Run `state = body(*state)` while `condition(*state)`, for each lane on its own; the last state."""
         return dr.while_loop(state, condition, body)
 
     def closest_hit(
         self, origin: Vector, direction: Vector, active: Array
     ) -> tuple[Array, Array, Array, Array]:
-        """Whether each ray hits, the triangle it hits first (0 if none), and its barycentric b1 and b2."""
+        """The first hit of each active ray: (whether it hits, triangle, barycentric b1, barycentric b2).
+
+        The last three are 0 on a miss.
+        """
         ray = mi.Ray3f(mi.Point3f(origin), direction)
         found = self._scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         hit = active & found.is_valid()
         triangle = dr.select(hit, found.prim_index, mi.UInt32(0))
-        # What a miss leaves in the coordinates is not defined.
+        # Mitsuba leaves the coordinates undefined on a miss.
         return hit, triangle, dr.select(hit, found.prim_uv.x, 0.0), dr.select(hit, found.prim_uv.y, 0.0)
 
     def occluded(self, origin: Vector, direction: Vector, max_t: Array, active: Array) -> Array:
-        """Whether anything stands within `max_t` lengths of `direction`."""
+        """Whether a triangle blocks each active ray within `max_t` times the length of `direction`."""
         ray = mi.Ray3f(mi.Point3f(origin), direction)
         ray.maxt = max_t
         return self._scene.ray_test(ray, coherent=False, active=active)
 
     def lanes(self, count: int) -> Array:
-        """The number of each lane, from 0."""
+        """Lane indices 0 … `count` − 1, uint32."""
         return dr.arange(mi.UInt32, count)
 
     def all_true(self, count: int) -> Array:
+        """True in each of `count` lanes."""
         return dr.full(mi.Bool, True, count)
 
     def zero_vectors(self, count: int) -> Vector:
+        """The zero vector in each of `count` lanes."""
         return dr.zeros(mi.Vector3f, count)
 
     def vector(self, x: Array, y: Array, z: Array) -> Vector:
+        """The vector (x, y, z) in each lane."""
         return mi.Vector3f(x, y, z)
 
     def to_index(self, number: Array) -> Array:
+        """Convert float32 to uint32, truncating."""
         return mi.UInt32(number)
 
     def to_number(self, index: Array) -> Array:
+        """Convert uint32 to float32."""
         return mi.Float(index)
 
     def to_numpy(self, array: Array | Vector) -> np.ndarray:
-        """[lanes] or [lanes, 3]. Runs what is pending; an interrupt is heard between kernels."""
+        """Convert to numpy, [lanes] or [lanes, 3]. This runs the pending kernel."""
         return np.array(array).T
 
     def evaluate(self, *arrays: Array | Vector) -> None:
-        """Compute `arrays` now, so that later kernels start from their values."""
+        """Compute `arrays` now, so that later kernels read their values and do not recompute them."""
         dr.eval(*arrays)
 
     def run(self, work: Callable[[], Any]) -> Any:
+        """Call `work`, which records or runs arithmetic, and return its result."""
         return work()
 
     dot = staticmethod(dr.dot)
@@ -102,9 +112,10 @@ class LlvmWavefront:
 
 
 def mitsuba_scene(triangles: UnitTriangles, floats: type, uints: type) -> Any:
-    """A Mitsuba scene of one mesh without vertex normals: only its intersections are used.
+    """A Mitsuba scene with one mesh. It has no vertex normals, since only its intersections are used.
 
-    Embree's robust mode is on, so that rays do not slip between neighbouring triangles.
+    Embree's robust mode is on, so that rays do not slip between adjacent triangles. `floats` and `uints` are
+    the array types of the current variant.
     """
     mesh = mi.Mesh("triangles", len(triangles.positions), len(triangles.triangles))
     parameters = mi.traverse(mesh)

@@ -1,4 +1,4 @@
-"""Spot, point and directional lights: the irradiance they bring, and light paths that start at them."""
+"""Spot, point and directional lights: the irradiance from them, and light paths that start at them."""
 
 import math
 
@@ -11,12 +11,13 @@ from vpltune.tuner.reference.surfaces import Surface
 from vpltune.tuner.reference.unit_triangles import UnitTriangles
 
 SHORTENING = 2.0**-13
-"""A shadow ray stops this share of its length before a light, which may be set into a surface."""
+"""A shadow ray ends this share of its length before the light, which may sit in a surface. A choice."""
 
 BEAM_RADIUS = 0.51
-"""Radius of the disc that directional light paths start from: a scene of diagonal 1 lies in its beam."""
+"""Radius of the disc from which directional light paths start. A scene of diagonal 1 fits into its beam,
+which needs 0.5; the rest is a margin."""
 
-_ROWS = 5
+_ROWS = 5  # vectors for each light; see _light_table
 
 
 class PunctualLights:
@@ -31,15 +32,18 @@ class PunctualLights:
         return self._wavefront.take_vector(self._table, index * _ROWS + row)
 
     def arriving(self, index, at: Surface):
-        """The unit vector to light `index`, the distance, its irradiance on the side of each surface that its
-        shading normal points to (W/m², no shadow), and the density of its light paths per surface area.
+        """How light `index` reaches each surface, without shadows.
 
         E = I(ω)·max(0, cos θ)/d² for spot and point lights, E⊥·max(0, cos θ) for directional ones.
+
+        Returns:
+            Unit vector to the light; distance (1e30 for a directional light); irradiance E in W/m² on the
+            side of the shading normal; density of the light's paths per unit area of the surface.
         """
         w = self._wavefront
         place, direction, intensity, falloff, density = (self._row(index, row) for row in range(_ROWS))
         to_light = place - at.position * falloff[0]
-        # 1e-12: a millionth of the diagonal squared, nearer than any ray starts.
+        # 1e-12 is a millionth of the diagonal, squared: closer than any ray starts.
         squared = w.maximum(w.dot(to_light, to_light), 1e-12)
         distance = w.sqrt(squared)
         to_light = to_light / distance
@@ -51,8 +55,10 @@ class PunctualLights:
         return to_light, reach, intensity * (cone * cone * cosine / squared), paths
 
     def irradiance(self, at: Surface, active, weight=None):
-        """Irradiance from all lights (W/m²) with shadows. `weight`, of the density of light paths, scales
-        the share of each light."""
+        """Irradiance from all lights in W/m², with shadows; 0 in lanes that are not `active`.
+
+        `weight` maps the density of a light's paths to a factor on its contribution; None means 1.
+        """
         w = self._wavefront
 
         def add_light(index, total):
@@ -67,7 +73,7 @@ class PunctualLights:
         return w.loop(lambda index, _: index < self.count, add_light, state)[1]
 
     def emitted(self, index, u, v):
-        """Origin and direction of a light path, of the density that `arriving` states where it lands."""
+        """Origin and direction of a path from light `index`, with the density that `arriving` returns."""
         w = self._wavefront
         place, direction, falloff, density = (self._row(index, row) for row in (0, 1, 3, 4))
         placed = falloff[0] > 0.0
@@ -78,14 +84,18 @@ class PunctualLights:
 
 
 def _light_table(triangles: UnitTriangles, lights: tuple[Light, ...]) -> Float32[np.ndarray, "lights 5 3"]:
-    """Rows: where the light is, or the way to it if it is at infinity; the way it shines; its intensity;
-    (1 if it is at a place or 0 at infinity, scale and offset of the cone falloff); (density of its paths per
-    steradian or per area of the beam, least cosine of their angle, unused).
+    """Five vectors for each light, in unit space:
 
-    Falloff is clamp(cos θ·scale + offset, 0, 1)², as KHR_lights_punctual writes it; scale 0 and offset 1
-    make a light that has none.
+    0. position, or for a directional light the unit vector towards it;
+    1. unit direction in which it shines;
+    2. intensity;
+    3. (1, or 0 for a directional light; scale of the cone falloff; offset of the cone falloff);
+    4. (density of its paths per steradian, or per unit area of the beam; cosine of the widest angle; unused).
+
+    The cone falloff is clamp(cos θ·scale + offset, 0, 1)², as in KHR_lights_punctual. Scale 0 and offset 1
+    turn it off.
     """
-    # Never without a row: Dr.Jit cannot look anything up in an empty table, even where it never does.
+    # At least one row: Dr.Jit cannot compile a lookup into an empty table, even one that never runs.
     table = np.zeros((max(1, len(lights)), _ROWS, 3))
     for row, light in zip(table, lights, strict=False):
         at_infinity = light.kind == "directional"
@@ -96,7 +106,7 @@ def _light_table(triangles: UnitTriangles, lights: tuple[Light, ...]) -> Float32
         least = -1.0
         if light.kind == "spot":
             least = np.cos(light.outer_cone)
-            # 1e-7: equal angles make a hard edge, and no division by zero.
+            # 1e-7 avoids a division by zero for equal angles, which give a hard edge.
             scale = 1.0 / max(np.cos(light.inner_cone) - least, 1e-7)
             row[3, 1:] = scale, -least * scale
         area = BEAM_RADIUS**2 if at_infinity else 2.0 * (1.0 - least)

@@ -1,4 +1,4 @@
-"""References of views: from the cache, else rendered until their noise is low enough."""
+"""References of views, from the cache or rendered until their noise is low enough."""
 
 from collections.abc import Callable
 
@@ -12,9 +12,10 @@ from vpltune.tuner.reference.reference_view import ReferenceView, noise_floor
 from vpltune.tuner.reference.variant import describe_variant
 
 FIRST_ROUND = 64
-"""Samples per half before the noise is first looked at; each later round doubles what there is."""
+"""Samples per pixel and half before the first noise estimate; later rounds double the total. A choice."""
 
 Progress = Callable[[str, float], None]
+"""Called with a view's name and the share of the work done, in [0, 1]."""
 
 
 def reference_views(
@@ -27,20 +28,20 @@ def reference_views(
     bounces: int | None = 1,
     progress: Progress | None = None,
 ) -> tuple[ReferenceView, ...]:
-    """The reference of each view, bit for bit the same for the same arguments, variant and versions.
+    """The reference of each view. Equal arguments, variant and versions give bit-identical results.
 
     Args:
-        scene: Geometry and materials; its own lights and cameras are not looked at, the views' are.
-        views: What to render.
-        seed: Of both halves' randomisation; at least 0.
-        noise_target: Sampling stops once `noise_floor` is at most this …
-        max_samples: … or a half has this many samples per pixel; at least 1.
-        bounces: Reflections before light arrives at a receiver: 1, more, or None for all.
-        progress: Called with the view's name and the share of all work that is done, in [0, 1].
+        scene: Geometry and materials. Its lights and cameras are ignored; each view brings its own.
+        views: Cameras, lights and image sizes to render.
+        seed: Seed of the randomisation of both halves, ≥ 0.
+        noise_target: Sampling stops once `noise_floor` is at most this, ≥ 0.
+        max_samples: Upper limit on samples per pixel in each half, ≥ 1.
+        bounces: Reflections before light arrives at a receiver, ≥ 1; None for unlimited.
+        progress: Called with the view's name and the share of the total work done, in [0, 1].
 
     Raises:
         InputError: the scene has no triangles, or an index in it is out of range.
-        ValueError: an argument is out of its range.
+        ValueError: an argument is out of range.
     """
     if max_samples < 1 or not noise_target >= 0.0 or (bounces is not None and bounces < 1) or seed < 0:
         raise ValueError(
@@ -87,7 +88,7 @@ def _rendered(
     bounces: int | None,
     report: Callable[[float], None],
 ) -> ReferenceView:
-    # Here, so that a run whose references are all kept does not load Mitsuba.
+    # Imported here, so that a run whose references are all cached does not load Mitsuba.
     from vpltune.tuner.reference.indirect_irradiance import IndirectIrradiance
     from vpltune.tuner.reference.traced_scene import traced_scene
 
@@ -115,6 +116,6 @@ def _rendered(
         floor = noise_floor(reference)
         if floor <= noise_target or done >= max_samples:
             return reference
-        # Variance falls at least as fast as 1/samples.
+        # The variance falls at least as fast as 1/samples.
         needed = max_samples if noise_target == 0.0 else min(max_samples, done * floor / noise_target)
         goal = min(2 * done, max_samples)

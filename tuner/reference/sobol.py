@@ -1,9 +1,9 @@
 """The first two Sobol' dimensions with hash-based Owen scrambling.
 
-Scrambled points are each uniform on the unit square, so their mean is unbiased, and together they
-fill it evenly, so that it converges faster than a mean of independent points (Owen 1997). The
-scrambling hash is Laine and Karras (2011) with the constants of Burley (2020), "Practical
-Hash-based Owen Scrambling", JCGT 9(4).
+Each scrambled point is uniform on the unit square, so a mean over the points is unbiased. Together they fill
+the square evenly, so it converges faster than with independent points (Owen 1997). The scrambling hash is
+Laine and Karras (2011) with the constants of Burley (2020), "Practical Hash-based Owen Scrambling",
+JCGT 9(4).
 """
 
 import numpy as np
@@ -11,10 +11,10 @@ from jaxtyping import UInt32
 
 
 def reversed_sobol_points(first: int, count: int) -> UInt32[np.ndarray, "count 2"]:
-    """Sobol' points first … first + count − 1 as 32-bit fractions with their bits reversed."""
+    """Sobol' points `first` … `first + count − 1`, as bit-reversed 32-bit fractions."""
     index = np.arange(first, first + count, dtype=np.uint32)
     second = np.zeros_like(index)
-    # Column k of the second generator matrix is Pascal's triangle modulo 2; here it is bit-reversed.
+    # The second generator matrix is Pascal's triangle modulo 2. `column` is its column `bit`, bit-reversed.
     column = np.uint32(1)
     for bit in range(32):
         second ^= np.where(index >> np.uint32(bit) & np.uint32(1), column, np.uint32(0))
@@ -23,7 +23,7 @@ def reversed_sobol_points(first: int, count: int) -> UInt32[np.ndarray, "count 2
 
 
 def owen_scrambled(wavefront, reversed_bits, seed):
-    """Numbers in [0, 1) from bit-reversed 32-bit fractions and one 32-bit seed per lane."""
+    """Owen-scrambled numbers in [0, 1) from bit-reversed 32-bit fractions and one 32-bit seed per lane."""
     x = reversed_bits + seed
     for multiplier in (0x6C50B47C, 0xB82F1E52, 0xC7AFE638, 0x8D22F6E6):
         x = x ^ x * multiplier
@@ -31,7 +31,7 @@ def owen_scrambled(wavefront, reversed_bits, seed):
 
 
 def hashed(wavefront, counter, seed):
-    """Independent-looking numbers in [0, 1) from 32-bit counters and seeds (Wellons' lowbias32)."""
+    """Pseudorandom numbers in [0, 1) from 32-bit counters and seeds (Wellons' lowbias32)."""
     x = counter ^ seed
     x = (x ^ x >> 16) * 0x21F0AAAD
     x = (x ^ x >> 15) * 0xD35A2D97
@@ -39,7 +39,7 @@ def hashed(wavefront, counter, seed):
 
 
 def _unit_interval(wavefront, bits):
-    # The upper 24 bits are all that a float32 in [0, 1) holds without rounding up to 1.
+    # 24 bits fill the mantissa of a float32. With more, the largest values would round up to 1.
     return wavefront.to_number(bits >> 8) * 2.0**-24
 
 

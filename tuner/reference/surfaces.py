@@ -1,36 +1,37 @@
-"""What a ray hits: position, normals and albedo, looked up in the scene's triangles."""
+"""Surface points: position, normals and albedo where a ray hits the scene's triangles."""
 
 from typing import Any, NamedTuple
 
 from vpltune.tuner.reference.unit_triangles import WRAP_MODES, UnitTriangles, srgb_decode_table
 
 OFFSET = 2.0**-17
-"""How far a ray starts off its surface, in scene diagonals.
+"""Distance between a surface and the start of a ray that leaves it, in scene diagonals.
 
-Positions are interpolated from corners of magnitude at most 1/2, each step rounding by 2⁻²⁵, and Embree's
-robust test errs by a few units in the last place of the distance to the triangle: together below 1e-6.
-2⁻¹⁷ ≈ 7.6e-6 clears that several times over, and is 0.04 mm in a room of five metres."""
+Positions are interpolated from corners of magnitude at most 1/2, and each step rounds by 2⁻²⁵. Embree's
+robust test errs by a few units in the last place of the distance to the triangle. Together the error is below
+1e-6. 2⁻¹⁷ ≈ 7.6e-6 is several times that, and 0.04 mm in a room of five metres."""
 
 
 class Surface(NamedTuple):
-    """One surface point per lane, in unit space."""
+    """One surface point per lane, in unit space. Only lanes with `hit` are meaningful."""
 
     hit: Any
+    """Whether the ray met a surface."""
     position: Any
     shading_normal: Any
-    """Unit length, turned to the side the ray came from."""
+    """Unit length, flipped to the side that the ray came from."""
     geometric_normal: Any
-    """Unit length by winding."""
+    """Unit length, oriented by the winding of the triangle."""
     albedo: Any
 
     def ray_origin(self, wavefront, direction):
-        """Where a ray that leaves along `direction` starts: just off the surface, on that side."""
+        """Origin for a ray that leaves along `direction`: `OFFSET` off the surface, on that side."""
         side = wavefront.dot(self.geometric_normal, direction)
         return self.position + self.geometric_normal * wavefront.where(side > 0.0, OFFSET, -OFFSET)
 
 
 class Surfaces:
-    """A scene's triangles with what is needed to shade them, on one wavefront."""
+    """The triangles of a scene and their shading data, on one wavefront."""
 
     def __init__(self, wavefront, triangles: UnitTriangles):
         self.wavefront = wavefront
@@ -47,7 +48,7 @@ class Surfaces:
         self._linear = wavefront.table(srgb_decode_table())
 
     def first_along(self, origin, direction, active) -> Surface:
-        """The surface that each ray meets first."""
+        """The first surface along each active ray, with position and `origin` in unit space."""
         w = self.wavefront
         hit, triangle, b1, b2 = w.closest_hit(origin, direction, active)
         b0 = 1.0 - b1 - b2
@@ -63,7 +64,7 @@ class Surfaces:
         geometric = w.take_vector(self._geometric_normals, triangle)
         normal = interpolated(self._normals)
         squared = w.dot(normal, normal)
-        # 1e-12: corner normals that cancel, or were zero, say nothing; the triangle's own normal does.
+        # Below 1e-12 the vertex normals cancel or are zero: use the triangle's own normal.
         usable = squared > 1e-12
         normal = w.where(usable, normal / w.sqrt(w.maximum(squared, 1e-12)), geometric)
         normal = w.where(w.dot(normal, direction) > 0.0, -normal, normal)
@@ -79,15 +80,15 @@ class Surfaces:
         return a * b0 + b * b1 + c * b2
 
     def _texture(self, row, u, v):
-        """Bilinear lookup of decoded texels; texel centres lie at (i + 1/2)/size, v = 0 at the top."""
+        """Bilinear lookup of decoded texels. Texel centres lie at (i + 1/2)/size; v = 0 is the top."""
         w = self.wavefront
         first, width, height, wrap_u, wrap_v = (w.take(self._textures, row * 5 + k) for k in range(5))
         left, right, along_u = self._texel_pair(u, w.to_number(width), wrap_u)
         upper, lower, along_v = self._texel_pair(v, w.to_number(height), wrap_v)
 
         def texel(column, line):
-            # The last texel at most, compared as integers: a coordinate so large that its fraction is not a
-            # number must not read outside the table.
+            # Clamp as integers: a coordinate so large that its fraction is NaN must not read outside the
+            # table.
             column = w.minimum(w.to_index(column), width - 1)
             line = w.minimum(w.to_index(line), height - 1)
             packed = w.take(self._texels, first + line * width + column)
@@ -98,7 +99,7 @@ class Surfaces:
         return top * (1.0 - along_v) + bottom * along_v
 
     def _texel_pair(self, coordinate, size, wrap):
-        """The two texels either side of a coordinate along one axis, and the weight of the second."""
+        """The two texels on either side of a coordinate along one axis, and the weight of the second."""
         w = self.wavefront
         mirrored = wrap == WRAP_MODES.index("mirrored_repeat")
         clamped = wrap == WRAP_MODES.index("clamp_to_edge")

@@ -1,4 +1,4 @@
-"""A scene ready for rays: the chosen Mitsuba variant, its acceleration structure, and surfaces to shade."""
+"""A scene prepared for ray tracing with the Mitsuba variant that works on this machine."""
 
 import functools
 from dataclasses import dataclass
@@ -12,16 +12,16 @@ from vpltune.tuner.reference.variant import select_variant
 
 @dataclass(frozen=True, eq=False)
 class TracedScene:
-    """One scene on one wavefront."""
+    """One scene, loaded onto one wavefront."""
 
     triangles: UnitTriangles
     wavefront: Any
-    """`LlvmWavefront` or `NumpyWavefront`, which have the same methods."""
+    """`LlvmWavefront` or `NumpyWavefront`. They have the same methods and hold the acceleration structure."""
     surfaces: Surfaces
 
 
 def traced_scene(scene: Scene) -> TracedScene:
-    """Build what rays need; the last scene asked for is kept.
+    """Prepare a scene for ray tracing. The most recent scene is cached.
 
     Raises:
         InputError: the scene has no triangles, or an index in it is out of range.
@@ -31,7 +31,7 @@ def traced_scene(scene: Scene) -> TracedScene:
 
 @functools.lru_cache(maxsize=1)
 def _traced_scene(scene: Scene, variant: str) -> TracedScene:
-    # Dr.Jit's array types differ by variant: each module is loaded only where its own is current.
+    # Dr.Jit's array types depend on the variant, so a module is imported only while its variant is current.
     if variant == "scalar_rgb":
         from vpltune.tuner.reference.numpy_wavefront import NumpyWavefront as Wavefront
     else:

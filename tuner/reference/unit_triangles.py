@@ -1,8 +1,7 @@
-"""A scene as one list of triangles in unit space: centred, and scaled to a diagonal of one.
+"""A scene as one list of triangles in unit space: centred, with a bounding-box diagonal of 1.
 
-Ray tracing needs small distances ("off this surface, but not through the next"). In unit space they
-are fixed fractions of the scene, so that a scene and the same scene a hundred times as large are
-traced alike.
+Ray tracing needs small distances, such as the offset of a ray from its surface. In unit space they are fixed
+fractions of the scene, so a scene is traced the same way at any scale.
 """
 
 from dataclasses import dataclass
@@ -14,45 +13,48 @@ from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.scene import Light, Mesh, Scene, transform_normals, transform_points
 
 WRAP_MODES = ("repeat", "mirrored_repeat", "clamp_to_edge")
+"""A wrap mode is stored as its index in this tuple."""
 
 
 @dataclass(frozen=True, eq=False)
 class UnitTriangles:
-    """All placed triangles of a scene, in unit space, and their textures packed end to end."""
+    """All triangles of a scene's instances, in unit space, and their textures packed end to end."""
 
     center_world: Float64[np.ndarray, "3"]
+    """Centre of the bounding box."""
     diagonal: float
-    """World length of one unit."""
+    """Length of the bounding-box diagonal in world units, > 0."""
     positions: Float32[np.ndarray, "vertices 3"]
     normals: Float32[np.ndarray, "vertices 3"]
-    """Unit length, or zero where a node is scaled flat."""
+    """Unit length, or zero where a node scales an axis to zero."""
     uv: Float32[np.ndarray, "vertices 2"]
     colors: Float32[np.ndarray, "vertices 3"]
     """Vertex colour times the material's base colour."""
     triangles: UInt32[np.ndarray, "triangles 3"]
     geometric_normals: Float32[np.ndarray, "triangles 3"]
-    """Unit length by winding; zero for a triangle without area, which no ray hits."""
+    """Unit length, oriented by winding; zero for a triangle without area, which no ray hits."""
     triangle_textures: UInt32[np.ndarray, " triangles"]
-    """Row of `textures`; row 0 is a single white texel, for materials without a texture."""
+    """Row of `textures`. Row 0 is a single white texel, for materials without a texture."""
     textures: UInt32[np.ndarray, "textures 5"]
-    """First texel, width, height, and the wrap modes along u and v as places in `WRAP_MODES`."""
+    """First texel, width, height, and the wrap modes along u and v as indices into `WRAP_MODES`."""
     texels: UInt32[np.ndarray, " texels"]
-    """sRGB bytes, red lowest."""
+    """sRGB bytes, red in the lowest."""
 
     def to_unit(self, points_world: Float[np.ndarray, "*n 3"]) -> Float64[np.ndarray, "*n 3"]:
-        """Points from world to unit space."""
+        """Map points from world to unit space."""
         return (points_world - self.center_world) / self.diagonal
 
     def unit_intensity(self, light: Light) -> Float64[np.ndarray, "3"]:
-        """Intensity that gives the same irradiance in unit space: W/sr shrink with the square of length."""
+        """The intensity that gives the same irradiance in unit space: W/sr scale with length squared."""
         return light.intensity if light.kind == "directional" else light.intensity / self.diagonal**2
 
 
 def unit_triangles(scene: Scene) -> UnitTriangles:
-    """Place, merge and rescale a scene's triangles.
+    """Transform, merge and rescale a scene's triangles.
 
     Raises:
-        InputError: no triangles; an index out of range; a position that is not finite; no extent.
+        InputError: the scene has no triangles or no extent, an index is out of range, or a vertex attribute
+            is not finite.
     """
     for mesh in scene.meshes:
         _check_mesh(scene, mesh)

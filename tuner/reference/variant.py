@@ -1,12 +1,11 @@
-"""Which Mitsuba variant works on this machine.
+"""Find the Mitsuba variant that works on this machine.
 
-`llvm_ad_rgb` is fast, but with an LLVM library too old for the processor it aborts the whole process at its
-first kernel. So it is tried in a process of its own, with each LLVM library found here, newest first, until
-one works; else `scalar_rgb` serves, slowly. The answer is kept in the cache folder until Mitsuba or one
-of the libraries changes.
+`llvm_ad_rgb` is fast, but an LLVM library too old for the processor makes it abort the whole process at its
+first kernel. So a child process tries each LLVM library on the machine, newest first. If none works, the slow
+`scalar_rgb` is used. The result is cached until Mitsuba or one of the libraries changes.
 
-Environment variables: VPLTUNE_MITSUBA_VARIANT forces `llvm_ad_rgb` or `scalar_rgb` untried;
-DRJIT_LIBLLVM_PATH names the only LLVM library to try; VPLTUNE_THREADS is how many threads Dr.Jit uses.
+Environment variables: VPLTUNE_MITSUBA_VARIANT forces `llvm_ad_rgb` or `scalar_rgb` without a trial;
+DRJIT_LIBLLVM_PATH names the only LLVM library to try; VPLTUNE_THREADS sets the number of Dr.Jit threads.
 """
 
 import contextlib
@@ -14,6 +13,7 @@ import functools
 import hashlib
 import importlib.metadata
 import json
+import logging
 import os
 import platform
 import re
@@ -27,11 +27,16 @@ from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.tuner.reference.cache import cache_folder, locked
 
-LIBRARIES_TRIED = 4
-PROBE_SECONDS = 60.0
-OLDEST_LLVM = 15
-"""Mitsuba 3.6 and later do not load anything older."""
+_log = logging.getLogger(__name__)
 
+LIBRARIES_TRIED = 4
+"""LLVM libraries to try at most. A choice: each failed trial costs a start of Python and Mitsuba."""
+PROBE_SECONDS = 60.0
+"""Time limit of one trial. A choice."""
+OLDEST_LLVM = 15
+"""Mitsuba 3.6 and later reject older LLVM versions."""
+
+# The script of a trial: render one sample, which compiles a kernel.
 _PROBE = """
 import mitsuba as mi
 mi.set_variant("llvm_ad_rgb")
@@ -44,25 +49,30 @@ assert mi.render(mi.load_dict(lit), spp=1).numpy().shape == (8, 8, 3)
 
 @dataclass(frozen=True)
 class MitsubaVariant:
-    """The variant in use, and why."""
+    """The Mitsuba variant in use, and why."""
 
     name: Literal["llvm_ad_rgb", "scalar_rgb"]
     libllvm: str | None
-    """The LLVM library it loads; None for the scalar variant, and where Dr.Jit finds its own."""
+    """Path of the LLVM library; None for the scalar variant, or if Dr.Jit is to find one itself."""
     sentence: str
+    """The reason, for the user."""
 
 
 def describe_variant() -> MitsubaVariant:
-    """The variant that references are made with here. Mitsuba is loaded by a process of its own, if at all.
+    """The variant that references are rendered with here. This process does not load Mitsuba to find out.
 
     Raises:
-        InputError: VPLTUNE_MITSUBA_VARIANT names another variant.
+        InputError: VPLTUNE_MITSUBA_VARIANT is neither `llvm_ad_rgb` nor `scalar_rgb`.
     """
     return _chosen_variant(os.environ.get("VPLTUNE_MITSUBA_VARIANT"), os.environ.get("DRJIT_LIBLLVM_PATH"))
 
 
 def select_variant() -> MitsubaVariant:
-    """Load Mitsuba and make the variant of `describe_variant` current."""
+    """Load Mitsuba and set the variant that `describe_variant` returns.
+
+    Raises:
+        InputError: VPLTUNE_MITSUBA_VARIANT is neither `llvm_ad_rgb` nor `scalar_rgb`.
+    """
     variant = describe_variant()
     if variant.libllvm is not None:
         os.environ["DRJIT_LIBLLVM_PATH"] = variant.libllvm
@@ -70,6 +80,7 @@ def select_variant() -> MitsubaVariant:
 
     if mitsuba.variant() != variant.name:
         mitsuba.set_variant(variant.name)
+        _log.debug("%s", variant.sentence)
         threads = os.environ.get("VPLTUNE_THREADS", "")
         if threads.isdecimal() and int(threads) > 0:
             import drjit
@@ -88,7 +99,7 @@ def _chosen_variant(forced: str | None, named_library: str | None) -> MitsubaVar
         return MitsubaVariant("llvm_ad_rgb", named_library, "VPLTUNE_MITSUBA_VARIANT asks for llvm_ad_rgb.")
     if forced:
         raise InputError(f"VPLTUNE_MITSUBA_VARIANT: must be llvm_ad_rgb or scalar_rgb, got {forced!r}")
-    # Last, whatever Dr.Jit finds by itself: on other systems it may know better.
+    # None comes last: Dr.Jit searches by itself and may know places that we do not.
     libraries = [named_library] if named_library else [*map(str, llvm_libraries()[:LIBRARIES_TRIED]), None]
     path = cache_folder() / "mitsuba_variant.json"
     key = _machine_key(libraries)
@@ -96,13 +107,13 @@ def _chosen_variant(forced: str | None, named_library: str | None) -> MitsubaVar
     if kept is not None:
         return kept
     with locked("mitsuba_variant"):
-        # Another process may have found it meanwhile.
+        # Another process may have stored the result while this one waited for the lock.
         kept = _kept_variant(path, key)
         if kept is not None:
             return kept
         variant, certain = _probed_variant(libraries)
         with contextlib.suppress(OSError, InputError):
-            for leftover in path.parent.glob(f".{path.stem}-*"):  # of a process killed while it wrote
+            for leftover in path.parent.glob(f".{path.stem}-*"):  # from a process killed while writing
                 leftover.unlink()
             if certain:
                 write_text_whole(path, json.dumps({"key": key, "variant": asdict(variant)}) + "\n")
@@ -118,7 +129,7 @@ def _kept_variant(path: Path, key: str) -> MitsubaVariant | None:
 
 
 def llvm_libraries() -> list[Path]:
-    """Shared LLVM libraries in the usual places, newest first."""
+    """Paths of the shared LLVM libraries in the usual folders, newest version first."""
     folders = [
         *map(Path, filter(None, os.environ.get("LD_LIBRARY_PATH", "").split(os.pathsep))),
         Path(sys.prefix) / "lib",
@@ -138,7 +149,7 @@ def llvm_libraries() -> list[Path]:
 
 
 def _probed_variant(libraries: list[str | None]) -> tuple[MitsubaVariant, bool]:
-    """The variant, and whether a second try would surely say the same."""
+    """The variant, and whether the result may be cached: no trial timed out or failed to start."""
     certain = True
     for library in libraries:
         environment = dict(os.environ) | ({"DRJIT_LIBLLVM_PATH": library} if library else {})
@@ -175,7 +186,7 @@ def _machine_key(libraries: list[str | None]) -> str:
             status = Path(library).stat() if library else None
             seen.append([library, status and [status.st_mtime_ns, status.st_size]])
     with contextlib.suppress(OSError):
-        # A cache folder may be shared by machines whose processors differ.
+        # Machines with different processors may share the cache folder.
         lines = Path("/proc/cpuinfo").read_text().splitlines()
         seen.append(next((line for line in lines if line.startswith(("flags", "Features"))), ""))
     return hashlib.sha256(json.dumps(seen).encode()).hexdigest()

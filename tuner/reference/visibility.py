@@ -1,4 +1,4 @@
-"""Ray-traced visibility between receivers and virtual point lights."""
+"""Ray-traced visibility between receivers and virtual point lights (VPLs)."""
 
 from functools import partial
 
@@ -10,11 +10,11 @@ from vpltune.tuner.reference.surfaces import OFFSET
 from vpltune.tuner.reference.traced_scene import TracedScene, traced_scene
 
 LIFT = 4.0 * OFFSET
-"""How far both ends are lifted off their surfaces, in scene diagonals: four times what exact hits need,
-since positions from rasterised buffers lie less exactly on their triangles."""
+"""Offset of both ends from their surfaces, in scene diagonals. A choice: four times the offset of exact hits,
+because positions from rasterised buffers lie less exactly on their triangles."""
 
 RAYS_PER_LAUNCH = 2**22
-"""Bounds the memory of one kernel, and with it the wait for an interrupt to be heard."""
+"""Rays in one kernel. A choice: it bounds memory, and the wait until an interrupt takes effect."""
 
 
 def ray_traced_visibility(
@@ -24,10 +24,10 @@ def ray_traced_visibility(
     vpl_positions_world: Float[np.ndarray, "vpls 3"],
     vpl_normals_world: Float[np.ndarray, "vpls 3"],
 ) -> Bool[np.ndarray, "receivers vpls"]:
-    """Whether nothing stands between each receiver and each VPL.
+    """Whether each receiver sees each VPL.
 
-    Both ends lie on surfaces, with unit normals on the lit side. A pair in which either end is behind the
-    other's tangent plane exchanges no light and is False too, without a ray.
+    Both ends lie on surfaces, with unit normals on the lit side. If either end is behind the other's tangent
+    plane, the pair exchanges no light: it is False and costs no ray.
 
     Raises:
         InputError: the scene has no triangles, or an index in it is out of range.
@@ -51,11 +51,11 @@ def _unoccluded(traced: TracedScene, tables: list, pair, count: int) -> Bool[np.
     w = traced.wavefront
     receivers, normals, vpls, vpl_normals = tables
     lane = w.lanes(count)
-    # Lanes that fill up the last packet look up 0, and an integer division by it would end the process.
+    # Padding lanes of the last packet look up 0, and an integer division by 0 would kill the process.
     first, row_length = w.take(pair, lane * 0), w.maximum(w.take(pair, lane * 0 + 1), 1)
     receiver, vpl = first + lane // row_length, lane % row_length
     origin = w.take_vector(receivers, receiver)
-    # Not of unit length: the segment ends at 1.
+    # `segment` is not normalised, so the ray ends at max_t = 1.
     segment = w.take_vector(vpls, vpl) - origin
     facing = w.dot(w.take_vector(normals, receiver), segment) > 0.0
     facing = facing & (w.dot(w.take_vector(vpl_normals, vpl), segment) < 0.0)

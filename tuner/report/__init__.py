@@ -1,4 +1,4 @@
-"""Reports: one self-contained HTML page for a fit, and one for a library of them.
+"""HTML reports: a page for each fit, and a page for a whole library.
 
-Everything a page shows lies within it; nothing is asked of any network, which the page itself forbids.
+Every page is self-contained. Its content security policy forbids network requests.
 """

@@ -1,4 +1,4 @@
-"""What a batch left on disk, as a report reads it: which scenes there are, and what became of each."""
+"""Read the output folder of a batch: its scenes and their records."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,22 +8,23 @@ from vpltune.tuner.batch.record import Record, Records
 from vpltune.tuner.report.fit_folder import is_fit_folder, read_json_object
 
 LISTING = "library.json"
+"""File that maps the names of the scenes to the keys of their records."""
 
 
 @dataclass(frozen=True)
 class BatchFolder:
-    """A batch's folder, read."""
+    """Contents of the output folder of a batch."""
 
     path: Path
     library: str
-    """The folder or list that was tuned."""
+    """The folder or list that was tuned; empty if unknown."""
     records: dict[str, Record]
-    """By name, as the library lists its scenes; two names may have one content, and one record."""
+    """Records by the name of the scene in the library. Scenes with identical content share a record."""
     waiting: tuple[str, ...]
-    """Names without a record so far."""
+    """Names of the scenes without a record."""
 
     def output(self, record: Record) -> Path | None:
-        """The folder of a record's fit; None where it has none, or names one outside the batch's."""
+        """The folder of a record's fit; None if it has none or if the path leads out of the batch folder."""
         if not record.output:
             return None
         folder = (self.path / record.output).resolve()
@@ -31,21 +32,24 @@ class BatchFolder:
 
 
 def is_batch_folder(path: Path) -> bool:
+    """Whether `path` is the output folder of a batch, that is, has a subfolder `records`."""
     return (path / "records").is_dir()
 
 
 def read_batch_folder(path: Path) -> BatchFolder:
-    """Read library.json and the records that it names; all records where there is no listing.
+    """Read library.json and the records that it names. Without library.json, read all records.
 
     Raises:
-        InputError: library.json cannot be read or is none.
+        InputError: library.json cannot be read or is malformed.
     """
     records = Records(path)
     if (path / LISTING).exists():
         document = read_json_object(path / LISTING)
         scenes = document.get("scenes")
         if not isinstance(scenes, dict) or not all(isinstance(key, str) for key in scenes.values()):
-            raise InputError(f"{path / LISTING}: key 'scenes' must be an object of keys by name")
+            raise InputError(
+                f"{path / LISTING}: key 'scenes' must be an object of names to keys, got {scenes!r:.60}"
+            )
         found = {name: records.read(Path(key).name) for name, key in scenes.items()}
         library = str(document.get("library", ""))
     else:

@@ -1,4 +1,4 @@
-"""Drawings of a page, as numbers that templates/charts.html.j2 writes as SVG."""
+"""The charts of a page as coordinates, which templates/charts.html.j2 draws as SVG."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,32 +7,37 @@ from typing import Any
 from vpltune.tuner.report.page_text import finite, number, words
 from vpltune.tuner.report.scaled_axis import Axis, Tick, axis_around
 
+# Size and margins of a line chart in the units of its SVG. A choice; charts.html.j2 draws the same frame.
 WIDTH, HEIGHT = 640.0, 300.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 66.0, 22.0, 14.0, 46.0
 
 MOST_DOTS = 40
+"""A line with more values has no dots. A choice: they would touch."""
 
 Point = tuple[float, float]
+"""x and y in the units of the SVG."""
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A point that is named."""
+    """A labelled point."""
 
     x: float
     y: float
     kind: str
-    """Its colour: a variant's name, or `plain`."""
+    """CSS class that sets the colour: `default`, `tuned`, `ceiling` or `budget`."""
     label: str = ""
     anchor: str = "start"
+    """Side of the label: `start`, `middle` or `end`, as in SVG."""
 
 
 @dataclass(frozen=True)
 class LineChart:
-    """A line in a frame with ticks; `description` says in words what it shows."""
+    """A line chart with ticks, in the units of its SVG."""
 
     title: str
     description: str
+    """What the chart shows, in words, for readers who cannot see it."""
     x_label: str
     y_label: str
     x_ticks: list[Tick]
@@ -40,14 +45,14 @@ class LineChart:
     line: list[Point]
     marks: list[Mark]
     dotted: bool
-    """Whether each value gets a dot: only where there is room for them."""
+    """Whether each value gets a dot."""
     levels: list[tuple[float, str]]
-    """Heights of horizontal lines, and what they stand for."""
+    """y and label of each horizontal line."""
 
 
 @dataclass(frozen=True)
 class Bar:
-    """A bar from 0 to a value; places are shares of the chart's width, in [0, 1]."""
+    """A bar from 0 to a value. `left` and `width` are shares of the chart's width, in [0, 1]."""
 
     label: str
     left: float
@@ -58,13 +63,18 @@ class Bar:
 
 @dataclass(frozen=True)
 class BarChart:
+    """A list of horizontal bars."""
+
     zero: float
-    """Where 0 stands: at the left end, unless a value is negative."""
+    """Position of 0 as a share of the width: 0 unless a value is negative."""
     bars: list[Bar]
 
 
 def loss_chart(loss: Mapping[str, Any]) -> LineChart | None:
-    """The loss at every step of the descent; None where fewer than two are known."""
+    """Chart of the loss over the steps of the descent; None if fewer than two values are known.
+
+    `loss` is the part `loss` of metrics.json; its key `curve` holds one loss per step.
+    """
     curve = loss.get("curve")
     values = [finite(value) for value in curve] if isinstance(curve, list) else []
     known = [(step, value) for step, value in enumerate(values) if value is not None]
@@ -99,12 +109,12 @@ def loss_chart(loss: Mapping[str, Any]) -> LineChart | None:
 
 
 def pareto_chart(front: Sequence[Mapping[str, Any]], ceiling: Any, budget: Any) -> LineChart | None:
-    """relMSE against milliseconds a frame; None where no point has both.
+    """Chart of relMSE against frame time; None if no point has both.
 
     Args:
-        front: points with `milliseconds` and `relmse`.
-        ceiling: relMSE of the ceiling, drawn as a level, or None.
-        budget: milliseconds that were asked for, marked on the axis, or None.
+        front: Points with `milliseconds` and `relmse`.
+        ceiling: relMSE of the ceiling, drawn as a horizontal line; None for no line.
+        budget: Frame-time budget in milliseconds, marked on the axis; None for no mark.
     """
     points = sorted(
         (milliseconds, error)
@@ -128,13 +138,13 @@ def pareto_chart(front: Sequence[Mapping[str, Any]], ceiling: Any, budget: Any) 
     marks = []
     if wanted is not None and wanted > 0.0:
         marks.append(
-            Mark(x.place(wanted), HEIGHT - _BOTTOM, "budget", f"asked for {number(wanted)} ms", "middle")
+            Mark(x.place(wanted), HEIGHT - _BOTTOM, "budget", f"budget {number(wanted)} ms", "middle")
         )
     return LineChart(
-        "Quality against milliseconds",
+        "Error against frame time",
         f"{len(points)} configs, from {number(times[0])} ms at relMSE {number(errors[0])} "
         f"to {number(times[-1])} ms at relMSE {number(errors[-1])}.",
-        "milliseconds a frame, log scale",
+        "frame time in ms, log scale",
         "relMSE, log scale",
         [(x.place(tick), number(tick)) for tick in x.ticks()],
         [(y.place(tick), number(tick)) for tick in y.ticks()],
@@ -146,7 +156,10 @@ def pareto_chart(front: Sequence[Mapping[str, Any]], ceiling: Any, budget: Any) 
 
 
 def bar_chart(values: Mapping[str, Any], word: Callable[[Any], str] = number) -> BarChart | None:
-    """Bars of the numbers among `values`, in their order; None where there is none."""
+    """Bars for the finite numbers among `values`, in their order; None if there are none.
+
+    `word` formats a number for its bar.
+    """
     known = {name: value for name, raw in values.items() if (value := finite(raw)) is not None}
     if not known:
         return None

@@ -1,4 +1,4 @@
-"""What a fit left on disk, as a report reads it: its own output, another version's, or a torn one."""
+"""Read the output folder of a fit. It may come from another version, or be incomplete."""
 
 import json
 from dataclasses import dataclass
@@ -10,11 +10,13 @@ from vpltune.renderer.errors import InputError
 from vpltune.tuner.evaluation.view_images import ViewImages, read_view_images
 
 METRICS = "metrics.json"
+"""File with the figures of a fit."""
 IMAGES = "images.npz"
+"""File with the linear images of a fit."""
 _OLDER_IMAGES = "pictures.npz"
-"""The name of the same file in version 0.1.0."""
+"""Name of the same file in version 0.1.0."""
 _PRESENT_NAMES = {**OLDER_NAMES, "error_budget": "error_breakdown"}
-"""Keys that version 0.1.0 wrote, to those of today."""
+"""Keys that version 0.1.0 wrote, and their present names."""
 _KINDS = {
     "parameters": dict,
     "metrics": dict,
@@ -28,33 +30,36 @@ _KINDS = {
     "notes": list,
     "pareto": list,
 }
-"""Keys of metrics.json that a page goes into; each may be absent."""
+"""Type of each key of metrics.json that a page reads. Every key is optional."""
 _OF_OBJECTS = ("per_view", "pareto", "uncertainty")
+"""Keys whose members must be objects."""
 
 
 @dataclass(frozen=True, eq=False)
 class FitFolder:
-    """A fit's folder, read."""
+    """Contents of the output folder of a fit."""
 
     path: Path
     document: dict[str, Any]
-    """metrics.json; numbers within may be null."""
+    """metrics.json. Any number in it may be null."""
     images: tuple[ViewImages, ...]
+    """Images of each view; empty if the fit kept none."""
 
     def part(self, key: str) -> Any:
-        """The object or list under `key`, empty where the fit made none."""
+        """The object or list under `key`; empty if the key is missing."""
         return self.document.get(key) or _KINDS[key]()
 
 
 def is_fit_folder(path: Path) -> bool:
+    """Whether `path` is the output folder of a fit, that is, holds metrics.json."""
     return (path / METRICS).is_file()
 
 
 def read_fit_folder(path: Path) -> FitFolder:
-    """Read metrics.json and images.npz below `path`.
+    """Read metrics.json and images.npz in `path`.
 
     Raises:
-        InputError: a file cannot be read, is not what its name says, or a key holds another kind of value.
+        InputError: a file cannot be read or is malformed, or a key holds a value of another type.
     """
     document = _with_present_names(read_json_object(path / METRICS))
     for key, kind in _KINDS.items():
@@ -71,17 +76,17 @@ def read_fit_folder(path: Path) -> FitFolder:
 
 
 def _with_present_names(value: Any) -> Any:
-    """`value` with the names of today wherever version 0.1.0 wrote others."""
+    """A JSON value with the keys of version 0.1.0 replaced by their present names, at every depth."""
     if isinstance(value, dict):
         return {_PRESENT_NAMES.get(key, key): _with_present_names(each) for key, each in value.items()}
     return [_with_present_names(each) for each in value] if isinstance(value, list) else value
 
 
 def read_json_object(path: Path) -> dict[str, Any]:
-    """The JSON object in `path`.
+    """Read the JSON object in `path`.
 
     Raises:
-        InputError: it cannot be read, or holds something else.
+        InputError: the file cannot be read, is not JSON, or holds another type of value.
     """
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
@@ -95,7 +100,7 @@ def read_json_object(path: Path) -> dict[str, Any]:
 
 
 def split_figures(document: dict[str, Any], split: str, variant: str) -> dict[str, Any]:
-    """relMSE, energy ratio and FLIP of a variant over the views of a split; empty where not known."""
+    """The figures of a variant over the views of a split, by name; empty if unknown."""
     figures = (document.get("metrics") or {}).get(split)
     figures = figures.get(variant) if isinstance(figures, dict) else None
     return figures if isinstance(figures, dict) else {}

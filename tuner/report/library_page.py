@@ -1,4 +1,4 @@
-"""The page of a library: totals, every scene worst first, and what was not tuned with its reason."""
+"""The page of a library: totals, tuned scenes from worst to best, and other scenes with the reason."""
 
 from dataclasses import dataclass, replace
 from statistics import median
@@ -11,34 +11,40 @@ from vpltune.tuner.report.page_text import change, finite, number, seconds
 from vpltune.tuner.report.scaled_axis import Axis, Tick, axis_around
 
 MAXIMUM_DRAWN = 40
-"""Scenes in the drawing, the worst: more would not be told apart."""
+"""Scenes in the chart, the worst ones. A choice: a longer chart is hard to read."""
+# Row height and margins of the chart in the units of its SVG. A choice; library.html.j2 draws the same frame.
 _ROW_HEIGHT, _LEFT, _RIGHT, _TOP, _BOTTOM = 22.0, 230.0, 700.0, 26.0, 36.0
 _ROW_BYTES = 1500
-"""What a row weighs but for its thumbnails and its words, generously."""
+"""Upper estimate of the bytes of a table row without its thumbnails and texts. A choice."""
 _REST_OF_PAGE = 200_000
+"""Bytes reserved for everything but the tables: chart, style and script. A choice."""
 
 
 @dataclass(frozen=True)
 class DumbbellRow:
-    """One scene of the drawing: where default, tuned and ceiling stand."""
+    """One scene of the chart: the relMSE of default, tuned and ceiling, in the units of the SVG."""
 
     name: str
     y: float
     spots: list[tuple[str, float]]
-    """Variant and place."""
+    """Variant and x of each dot."""
     span: tuple[float, float]
+    """x of default and tuned, which a line connects."""
 
 
 @dataclass(frozen=True)
 class DumbbellChart:
+    """relMSE before and after tuning, one row for each scene."""
+
     description: str
+    """What the chart shows, in words, for readers who cannot see it."""
     height: float
     rows: list[DumbbellRow]
     ticks: list[Tick]
 
 
 def library_page(batch: BatchFolder, tuned: list[TunedRow], untuned: list[UntunedRow]) -> str:
-    """The HTML text of a library's page."""
+    """The HTML of a library's page."""
     ordered = worst_first(tuned)
     shown, left_out = _within_size(ordered, untuned)
     records = batch.records.values()
@@ -63,7 +69,7 @@ def library_page(batch: BatchFolder, tuned: list[TunedRow], untuned: list[Untune
 
 
 def dumbbell_chart(rows: list[TunedRow]) -> DumbbellChart | None:
-    """relMSE before and after on a log axis, worst scene at the top; None where nothing can be drawn."""
+    """Chart of relMSE before and after tuning, on a log axis; None if no row has both values."""
     drawable = [
         row for row in rows if (row.relmse["tuned"] or 0.0) > 0.0 and (row.relmse["default"] or 0.0) > 0.0
     ]
@@ -111,7 +117,7 @@ def _cards(batch: BatchFolder, rows: list[TunedRow], untuned: list[UntunedRow]) 
             "note": ", ".join(f"{count} {status}" for status, count in counts.items() if count),
         },
         {
-            "what": "relMSE, median",
+            "what": "Median relMSE",
             "before": number(middle["default"]),
             "after": number(middle["tuned"]),
             "note": " · ".join(filter(None, (fell, f"ceiling {number(middle['ceiling'])}"))),
@@ -120,13 +126,13 @@ def _cards(batch: BatchFolder, rows: list[TunedRow], untuned: list[UntunedRow]) 
             "what": "Better than default",
             "before": "",
             "after": f"{sum(ratio < 1.0 for ratio in ratios)} of {len(ratios)}",
-            "note": f"energy ratio {number(_median([row.energy_ratio for row in rows]))} in the median",
+            "note": f"median energy ratio {number(_median([row.energy_ratio for row in rows]))}",
         },
         {
-            "what": "Time on scenes",
+            "what": "Total time",
             "before": "",
             "after": seconds(sum(spent)),
-            "note": f"{seconds(_median(spent))} a scene in the median" if spent else "",
+            "note": f"median {seconds(_median(spent))} per scene" if spent else "",
         },
     ]
 
@@ -137,7 +143,7 @@ def _median(values: list[float | None]) -> float | None:
 
 
 def _untuned_limit(untuned: list[UntunedRow]) -> int:
-    """How many of the scenes that were not tuned the page lists: a fifth of its size for them."""
+    """Number of untuned scenes that fit into the fifth of the page that is reserved for them."""
     room, count = MAXIMUM_PAGE_BYTES // 5, 0
     for row in untuned:
         room -= _ROW_BYTES // 2 + 6 * len(row.name) + 6 * len(row.reason)
@@ -148,13 +154,16 @@ def _untuned_limit(untuned: list[UntunedRow]) -> int:
 
 
 def _within_size(rows: list[TunedRow], untuned: list[UntunedRow]) -> tuple[list[TunedRow], int]:
-    """The worst rows, as many as the page may hold, and how many are left out; thumbnails go first."""
+    """The worst rows that fit into the page, and the number of rows left out.
+
+    Rows lose their thumbnails before any row is left out.
+    """
     room = MAXIMUM_PAGE_BYTES - _REST_OF_PAGE - (MAXIMUM_PAGE_BYTES // 5 if untuned else 0)
-    # Half of the page for thumbnails: the other half holds thousands of rows without.
+    # Thumbnails may take half of the room. The other half holds thousands of rows without thumbnails.
     images, shown = room // 2, []
     for row in rows:
         weight = sum(len(address) for address in row.thumbnails.values())
-        # Escaped, a character may take six bytes; a name stands in a row three times.
+        # An escaped character takes up to six bytes, and a row contains its name three times.
         words = _ROW_BYTES + 18 * len(row.name) + 6 * len(row.sentence)
         if weight > images:
             row, weight = replace(row, thumbnails={}), 0

@@ -1,4 +1,4 @@
-"""The rows of a library's table: a scene's figures and thumbnails, and what became of those without."""
+"""The rows of a library's tables: figures and thumbnails of tuned scenes, reasons for the others."""
 
 import base64
 import io
@@ -15,48 +15,51 @@ from vpltune.tuner.report.page_text import finite
 from vpltune.tuner.report.view_blocks import image_exposure
 
 THUMBNAIL_WIDTH = 120
+"""Pixels. A choice; library.html.j2 has the same number."""
 
 
 @dataclass(frozen=True)
 class TunedRow:
-    """A scene that was tuned; relMSE, energy ratio and FLIP on held-out views, where there are any."""
+    """A tuned scene, with its figures on held-out views, or on fitted views if there are no others."""
 
     name: str
     address: str
-    """Of its page, relative to the library's."""
+    """URL of the scene's page, relative to the library's page."""
     relmse: dict[str, float | None]
-    """By variant."""
+    """relMSE by variant; None if unknown."""
     energy_ratio: float | None
     flip: float | None
     seconds: float | None
     fit: str
-    """How the fit ended: `improved`, `kept` or `doubtful`; empty where that is not known."""
+    """Outcome of the fit: `improved`, `kept` or `doubtful`; empty if unknown."""
     sentence: str
+    """The outcome in words."""
     thumbnails: dict[str, str]
-    """data: addresses of `reference`, `default` and `tuned`; empty where the fit kept no images."""
+    """data: URLs of `reference`, `default` and `tuned`; empty if the fit kept no images."""
 
     @property
     def ratio(self) -> float | None:
-        """relMSE tuned over default: below 1 where tuning helped."""
+        """relMSE of tuned ÷ default: below 1 if tuning helped, None if unknown."""
         default, tuned = self.relmse["default"], self.relmse["tuned"]
         return None if default is None or tuned is None or default <= 0.0 else tuned / default
 
 
 @dataclass(frozen=True)
 class UntunedRow:
-    """A scene that has no figures, and why."""
+    """A scene without figures, and the reason."""
 
     name: str
     status: str
+    """The status of its record, `unreadable`, or `waiting`."""
     reason: str
     attempts: Any
     seconds: Any
     address: str = ""
-    """Of its page, where there was nothing to fit but a page all the same."""
+    """URL of its page, relative to the library's page; empty if it has none. Unlit scenes have one."""
 
 
 def tuned_row(name: str, record: Record, fit: FitFolder, page: str) -> TunedRow:
-    """The row of a scene whose fit was read; `page` is the address of its page."""
+    """The row of a tuned scene. `page` is the URL of its page, relative to the library's page."""
     split = "held_out" if split_figures(fit.document, "held_out", "tuned") else "fitted"
     figures = {variant: split_figures(fit.document, split, variant) for variant in VARIANTS}
     return TunedRow(
@@ -73,7 +76,7 @@ def tuned_row(name: str, record: Record, fit: FitFolder, page: str) -> TunedRow:
 
 
 def worst_first(rows: list[TunedRow]) -> list[TunedRow]:
-    """By relMSE after tuning, the greatest first; what has none is worse than any."""
+    """Rows by descending relMSE of tuned. Rows without a relMSE come first."""
 
     def badness(row: TunedRow) -> float:
         tuned = row.relmse["tuned"]

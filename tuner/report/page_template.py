@@ -1,4 +1,4 @@
-"""From a template to the text of a page that lies in one file and reaches for nothing outside it."""
+"""Render a template to a self-contained HTML page."""
 
 import base64
 import hashlib
@@ -12,24 +12,24 @@ from markupsafe import Markup
 from vpltune.tuner.report import page_text
 
 MAXIMUM_PAGE_BYTES = 8_000_000
-"""A page is no larger, so that it can be mailed and opens at once; what is left out is said."""
+"""Largest size of a page. A choice: it opens at once and can be mailed. The page says what is left out."""
 
 
 def page_html(template: str, style: tuple[str, ...], script: str, **context: Any) -> str:
-    """The whole page.
+    """The HTML of a page.
 
     Args:
-        template: name of the page's template.
-        style: names of its style sheets, joined in this order.
-        script: name of its script.
-        context: what the template shows. Strings come from scene files and are escaped.
+        template: File name of the template.
+        style: File names of the style sheets, joined in this order.
+        script: File name of the script.
+        context: Variables of the template. Strings may come from scene files, so they are escaped.
     """
     environment = _environment()
     css = "\n".join(_source(name) for name in style)
     javascript = _source(script)
     return environment.get_template(template).render(
         policy=_policy(css, javascript),
-        # The project's own files, in which nothing may be escaped: the policy knows them by their hash.
+        # Our own files are not escaped: the policy allows them by the hash of their exact text.
         style=Markup(css),
         script=Markup(javascript),
         version=importlib.metadata.version("vpltune"),
@@ -57,7 +57,7 @@ def _source(name: str) -> str:
 
 
 def _policy(css: str, javascript: str) -> str:
-    """Content security policy: our own style and script, images that lie in the page, and nothing else."""
+    """Content security policy that allows our own style and script and embedded images, and nothing else."""
     style, script = (
         base64.b64encode(hashlib.sha256(text.encode("utf-8")).digest()).decode("ascii")
         for text in (css, javascript)

@@ -1,14 +1,15 @@
-"""Numbers as a page words them. Values come from files: what is no number is a dash."""
+"""Format values for a page. Values come from files; whatever is not a number becomes a dash."""
 
 import math
 from typing import Any
 
 NONE = "–"
+"""Shown in place of a missing value."""
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def finite(value: Any) -> float | None:
-    """`value` as a float, if it is a finite number."""
+    """`value` as a float if it is a finite number, else None."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
     try:
@@ -19,13 +20,13 @@ def finite(value: Any) -> float | None:
 
 
 def words(name: str) -> str:
-    """A key of a file as one would write it."""
+    """The name of a key as words, for example `vpl_count` as "VPL count"."""
     spoken = {"vpl": "VPL", "vpls": "VPLs", "n": "N", "sha256": "SHA-256", "jax": "JAX", "opengl": "OpenGL"}
     return " ".join(spoken.get(word, word) for word in name.split("_"))
 
 
 def number(value: Any, digits: int = 3) -> str:
-    """Three significant digits, powers of ten beyond what is easily read."""
+    """`value` to `digits` significant digits; as a power of ten below 1e-4 and from 1e6 on."""
     known = finite(value)
     if known is None:
         return NONE
@@ -39,7 +40,7 @@ def number(value: Any, digits: int = 3) -> str:
 
 
 def seconds(value: Any) -> str:
-    """A duration in the units that one would say it in."""
+    """A duration in seconds as ms, s, min or h."""
     known = finite(value)
     if known is None or known < 0.0:
         return NONE
@@ -52,7 +53,7 @@ def seconds(value: Any) -> str:
 
 
 def change(before: Any, after: Any) -> str:
-    """By which share a figure fell or rose."""
+    """The change from `before` to `after` in words, for example "75 % less"; empty if unknown."""
     old, new = finite(before), finite(after)
     if old is None or new is None or old <= 0.0:
         return ""
@@ -65,7 +66,7 @@ def change(before: Any, after: Any) -> str:
 
 
 def ratio(value: Any) -> str:
-    """A ratio as the change that it is."""
+    """A ratio as a signed percentage, or as a factor from 2 on."""
     known = finite(value)
     if known is None:
         return NONE

@@ -1,4 +1,4 @@
-"""The table of parameters: value, place in the allowed range, and how sure the fit is of it."""
+"""The table of parameters: each value, its position in the allowed range, and its interval."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,23 +8,27 @@ from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, Paramet
 from vpltune.tuner.report.page_text import finite, number, words
 from vpltune.tuner.report.scaled_axis import Axis
 
+# Width and margin of a range bar in the units of its SVG. A choice; charts.html.j2 draws the same bar.
 BAR_WIDTH = 180.0
 _MARGIN = 5.0
 
 
 @dataclass(frozen=True)
 class RangeBar:
-    """Places along a bar `BAR_WIDTH` wide that stands for the allowed range."""
+    """Positions along a bar that represents the allowed range, in the units of its SVG."""
 
     value: float
     default: float
     interval: tuple[float, float] | None
     """Left end and width."""
     description: str
+    """The same in words, for readers who cannot see it."""
 
 
 @dataclass(frozen=True)
 class ParameterRow:
+    """One row of the table. All strings are ready to be shown."""
+
     name: str
     symbol: str
     value: str
@@ -33,23 +37,28 @@ class ParameterRow:
     meaning: str
     bar: RangeBar | None
     interval: str
-    """The stated interval, or empty."""
+    """The 90 % interval; empty if unknown."""
     source: str
-    """What the value was determined by."""
+    """What determined the value: the scene, the prior, the fit, or none of them."""
     trades_with: str
+    """Names of the parameters that it trades off against."""
     fitted: bool
+    """Whether the parameter can be fitted."""
 
 
 def parameter_rows(parameters: Mapping[str, Any], uncertainty: Mapping[str, Any]) -> list[ParameterRow]:
-    """A row for every parameter of metrics.json: those of the table in its order, then any others."""
+    """One row for each parameter of metrics.json: those that this version knows, then any others.
+
+    Args:
+        parameters: Value of each parameter.
+        uncertainty: The part `uncertainty` of metrics.json: interval and source of each fitted parameter.
+    """
     specs = {spec.name: spec for spec in ARTIST_PARAMETERS}
     known = [
         _row(specs[name], parameters[name], uncertainty.get(name, {})) for name in specs if name in parameters
     ]
     unknown = [
-        ParameterRow(
-            name, "", number(value, 4), "", "", "", None, "", "not in this version's table", "", False
-        )
+        ParameterRow(name, "", number(value, 4), "", "", "", None, "", "unknown to this version", "", False)
         for name, value in parameters.items()
         if name not in specs
     ]
@@ -90,7 +99,7 @@ def _bar(spec: ParameterSpec, value: float | None, interval: tuple[float, float]
     if interval is not None:
         left, right = (axis.place(end) for end in interval)
         ends = (left, max(round(right - left, 2), 1.0))
-        described += f", between {number(interval[0])} and {number(interval[1])}"
+        described += f", 90 % interval {number(interval[0])} to {number(interval[1])}"
     return RangeBar(
         axis.place(value),
         axis.place(float(spec.default)),

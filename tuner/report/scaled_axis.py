@@ -1,4 +1,4 @@
-"""Axes of a drawing: where a value stands, and which values get a tick."""
+"""Axes of a chart: from a value to its position, and which values get a tick."""
 
 import math
 from dataclasses import dataclass
@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from vpltune.renderer.config.artist_parameters import Scale
 
 Tick = tuple[float, str]
-"""Where a tick stands, and its label."""
+"""Position of a tick, and its label."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """Values from `low` to `high` along the stretch from `start` to `stop` of a drawing.
+    """Maps values from `low` to `high` to positions from `start` to `stop`.
 
-    A log axis needs low > 0; `low` and `high` must differ.
+    `low` and `high` must differ; a log axis needs low > 0.
     """
 
     low: float
@@ -23,17 +23,17 @@ class Axis:
     scale: Scale = "linear"
 
     def place(self, value: float | int) -> float:
-        """Where `value` stands; what lies outside stands at the end it is beyond."""
+        """The position of `value`, clamped to the axis."""
         return round(self.start + (self.stop - self.start) * self.share(value), 2)
 
     def share(self, value: float | int) -> float:
-        """How far along the axis `value` stands, in [0, 1]."""
+        """The position of `value` as a share of the axis, in [0, 1]."""
         inside = min(max(value, self.low), self.high)
         low, high, at = (self._unit(end) for end in (self.low, self.high, inside))
         return (at - low) / (high - low)
 
     def ticks(self, about: int = 5) -> list[float]:
-        """Round values within the axis, roughly `about` of them."""
+        """Roughly `about` round values within the axis."""
         if self.scale == "log":
             return self._log_ticks(about)
         step = _round_step((self.high - self.low) / about)
@@ -54,7 +54,7 @@ class Axis:
 
 
 def axis_around(values: list[float], start: float, stop: float, scale: Scale = "linear") -> Axis:
-    """An axis that holds all `values` with a little room; on a linear one, from 0 if none is negative."""
+    """An axis that holds all `values` with a margin. A linear axis starts at 0 if no value is negative."""
     low, high = min(values), max(values)
     if scale == "log":
         room = max((high / low) ** 0.06, 1.05)

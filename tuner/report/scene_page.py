@@ -1,4 +1,4 @@
-"""The page of one fit: images, figures, parameters, and how they came about."""
+"""The page of one fit: images, figures, parameters, charts and provenance."""
 
 from collections.abc import Mapping
 from pathlib import PurePath
@@ -14,35 +14,40 @@ from vpltune.tuner.report.parameter_rows import parameter_rows
 from vpltune.tuner.report.view_blocks import SHOWN, ViewBlock, view_block
 
 SPLITS = {"fitted": "fitted views, mean", "held_out": "held-out views, mean"}
+"""Splits of the views, and their titles in the table of figures."""
 FIGURES = {
     "relmse": "relMSE",
     "trimmed_relmse": "without worst 0.1 %",
-    "worst_share": "their share",
+    "worst_share": "share of worst",
     "median_error": "median pixel",
     "energy_ratio": "energy",
     "flip": "FLIP",
 }
+"""Figures in that table (`tuner.metrics.view_metrics.ViewMetrics`), and their headings."""
 CARDS = {
     "trimmed_relmse": "relMSE without the worst 0.1 %",
     "energy_ratio": "Energy ratio",
     "flip": "HDR-FLIP",
 }
+"""Figures on the cards at the top, and their titles."""
 VISIBILITY_WORDS = {
-    "none": "VPLs without visibility",
-    "transmittance": "mean transmittance for visibility",
+    "none": "no visibility",
+    "transmittance": "exponential extinction only",
     "maps": "visibility maps",
 }
-_NO_IMAGES = "This fit kept no images (images.npz), so there is nothing to show here."
+"""Visibility modes in words; `none` is from version 1 of the config."""
+_NO_IMAGES = "This fit kept no images (images.npz), so there are none to show."
 _REST_OF_PAGE = 600_000
-"""Bytes kept for everything but images: tables, curve, style and script."""
+"""Bytes reserved for everything but images: tables, charts, style and script. A choice."""
 
 
 def scene_page(fit: FitFolder, name: str | None = None, library: str | None = None) -> str:
-    """The HTML text of a fit's page.
+    """The HTML of a fit's page.
 
     Args:
-        name: its heading; None takes the scene file's.
-        library: relative address of the library's page that it belongs to.
+        fit: Output folder of the fit.
+        name: Heading of the page; None for the name of the scene file.
+        library: Relative URL of the library's page that links to it; None if there is none.
     """
     document = fit.document
     views, left_out = _views(fit)
@@ -87,12 +92,12 @@ def scene_page(fit: FitFolder, name: str | None = None, library: str | None = No
 
 
 def scene_name(document: Mapping[str, Any]) -> str:
-    """What to call the scene of a metrics.json."""
+    """The name of the scene of a metrics.json: its file name without extension."""
     return PurePath(str(document.get("scene", "scene"))).stem
 
 
 def _views(fit: FitFolder) -> tuple[list[ViewBlock], str]:
-    """What is shown, and a sentence on what was left out for the page's size."""
+    """The views that fit into the page, and a sentence on those left out; empty if there are none."""
     measured = fit.part("per_view")
     room, shown = MAXIMUM_PAGE_BYTES - _REST_OF_PAGE, []
     for images in fit.images:
@@ -106,12 +111,12 @@ def _views(fit: FitFolder) -> tuple[list[ViewBlock], str]:
         return shown, ""
     return (
         shown,
-        f"{missing} more views were measured: with their images the page would be too large.",
+        f"{missing} more views were measured; their images are left out to keep the page small.",
     )
 
 
 def _cards(document: Mapping[str, Any]) -> list[dict[str, str]]:
-    """The three figures that matter, before and after, on views that were not fitted where there are any."""
+    """The figures of `CARDS`, before and after, on held-out views, or fitted views if there are no others."""
     split = "held_out" if split_figures(document, "held_out", "tuned") else "fitted"
     default, tuned, ceiling = (split_figures(document, split, variant) for variant in VARIANTS)
     where = {"held_out": "held-out views", "fitted": "fitted views"}[split]
@@ -151,7 +156,7 @@ def _figure_rows(figures: Mapping[str, Any]) -> list[dict[str, str]]:
 
 
 def _error_breakdown(budget: Mapping[str, Any]) -> tuple[BarChart | None, str]:
-    """Bars of the causes, the greatest first, and the views that they were measured on."""
+    """Bars of the causes in descending order, and the views that they were measured on."""
     causes = {name: value for name, raw in budget.items() if (value := finite(raw)) is not None}
     views = str(budget.get("views", "")).replace("_", " ")
     return bar_chart(dict(sorted(causes.items(), key=lambda cause: -cause[1]))), views
@@ -177,7 +182,7 @@ def _front_row(point: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _choice(point: Mapping[str, Any]) -> str:
-    """What was chosen beside the parameters, in words."""
+    """The settings that were chosen besides the parameters, in words."""
     choice = point.get("choice")
     named = choice.items() if isinstance(choice, dict) else ()
     return ", ".join(
@@ -186,7 +191,7 @@ def _choice(point: Mapping[str, Any]) -> str:
 
 
 def _frame_budget(budget: Mapping[str, Any]) -> list[dict[str, str]]:
-    """Cards on the frame that was asked for and the one that was measured; none where none was."""
+    """Cards on the frame-time budget and the measured frame; none if there was no budget."""
     if not budget:
         return []
     size = budget.get("frame_size")
@@ -195,16 +200,16 @@ def _frame_budget(budget: Mapping[str, Any]) -> list[dict[str, str]]:
     predicted = f"predicted {number(budget.get('predicted_milliseconds'))} ms"
     return [
         {
-            "what": "Asked for",
+            "what": "Budget",
             "after": f"{number(asked)} ms",
-            "note": f"a frame of {pixels}" if pixels else "",
+            "note": f"at {pixels}" if pixels else "",
         },
         {"what": "Measured", "after": f"{number(measured)} ms", "note": predicted},
         {"what": "VPLs", "after": number(budget.get("vpl_count"), 5), "note": _choice(budget)},
         {
             "what": "relMSE",
             "after": number(budget.get("relmse")),
-            "note": "over rotations of the point table that were not fitted",
+            "note": "over rotations of the point table that the fit did not use",
         },
     ]
 

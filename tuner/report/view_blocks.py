@@ -1,4 +1,4 @@
-"""The images of a page: linear ones for its script, ready ones where none runs, and maps of the error."""
+"""The images of a page: linear for its script, tone-mapped for when no script runs, and error maps."""
 
 import base64
 import io
@@ -16,6 +16,7 @@ from vpltune.tuner.metrics.tone_curve import LUMINANCE, display_image
 from vpltune.tuner.metrics.view_metrics import hdr_flip_map
 
 SHOWN = ("reference", *VARIANTS)
+"""The images of each view; scene.js lists the same names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,28 +26,31 @@ class ViewBlock:
     index: int
     name: str
     split: str
+    """`fitted` or `held_out`; empty if unknown."""
     width: int
     height: int
     figures: dict[str, dict[str, Any]]
-    """relMSE, energy ratio and FLIP by variant."""
+    """Figures by variant and name."""
     noise_floor: Any
     samples: Any
     images: dict[str, str]
-    """data: addresses of `SHOWN`, exposed and tone-mapped."""
+    """data: URL of each image of `SHOWN`, exposed and tone-mapped."""
     signed_maps: dict[str, str]
+    """data: URL of each variant's map of the signed error."""
     flip_maps: dict[str, str]
+    """data: URL of each variant's map of HDR-FLIP."""
     linear: dict[str, Any]
-    """What the script reads: sizes, exposures, and half floats by name, see `packed_halves`."""
+    """Data for the script: size, exposures, and linear images as `packed_halves`."""
 
     @property
     def weight(self) -> int:
-        """Bytes that it adds to the page."""
+        """Bytes that the images add to the page."""
         texts = (self.images, self.signed_maps, self.flip_maps, self.linear["halves"])
         return sum(len(text) for part in texts for text in part.values())
 
 
 def view_block(images: ViewImages, measured: dict[str, Any]) -> ViewBlock:
-    """Everything a page shows of one view. `measured` is its entry in `per_view`."""
+    """Everything that a page shows of one view. `measured` is its entry of `per_view` in metrics.json."""
     valid = images.valid
     exposures = {
         "image": image_exposure(images),
@@ -96,9 +100,10 @@ def _linear(images: ViewImages) -> dict[str, np.ndarray]:
 
 
 def packed_halves(image: np.ndarray) -> str:
-    """A linear image as text: half floats, low bytes before high ones, plane by plane; zlib, base64.
+    """Encode a linear image [height, width, 3] as text: half floats, split into planes, zlib, base64.
 
-    Bytes sorted like that weigh a quarter less than side by side.
+    The planes are the low bytes of each channel, then the high bytes of each channel. In this order the text
+    is a quarter shorter than with interleaved bytes.
     """
     halves = np.ascontiguousarray(image.astype("<f2"))
     planes = halves.view(np.uint8).reshape(*halves.shape, 2).transpose(3, 2, 0, 1)
@@ -106,23 +111,23 @@ def packed_halves(image: np.ndarray) -> str:
 
 
 def png_address(image: np.ndarray) -> str:
-    """An 8-bit image as a data: address."""
+    """An 8-bit image as a data: URL of a PNG file."""
     file = io.BytesIO()
     Image.fromarray(image).save(file, "PNG", optimize=True)
     return data_address(file.getvalue())
 
 
 def data_address(png: bytes) -> str:
-    """A PNG file as a data: address."""
+    """The bytes of a PNG file as a data: URL."""
     return f"data:image/png;base64,{base64.b64encode(png).decode('ascii')}"
 
 
 def image_exposure(images: ViewImages) -> float:
-    """What a whole image of the view is multiplied by before the tone curve, in every variant."""
+    """The exposure of whole images of a view, the same for all variants: the factor before the tone curve."""
     return _exposure(images.radiance("reference"), images.valid)
 
 
 def _exposure(linear: np.ndarray, valid: np.ndarray) -> float:
-    """What brings the mean luminance to the runtime's key."""
+    """The factor that brings the mean luminance to `EXPOSURE_KEY`, as in the runtime; 1 for a black image."""
     level = float((linear[valid].astype(np.float64) @ LUMINANCE).mean()) if valid.any() else 0.0
     return EXPOSURE_KEY / level if level > 0.0 else 1.0

@@ -1,4 +1,4 @@
-"""Writes the page of a fit, or the pages of a library, into its folder."""
+"""Write the page of a fit, or the pages of a library, into its folder."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,22 +15,30 @@ from vpltune.tuner.report.library_rows import TunedRow, UntunedRow, tuned_row
 from vpltune.tuner.report.scene_page import scene_page
 
 SCENE_PAGE = "report.html"
+"""File name of the page of a fit."""
 LIBRARY_PAGE = "index.html"
+"""File name of the page of a library."""
 
 
 @dataclass(frozen=True)
 class WrittenPages:
-    """The pages that were written, the one to open first, and what could not be read."""
+    """The pages that were written, and the problems on the way."""
 
     pages: tuple[Path, ...]
+    """The page to open comes first."""
     problems: tuple[str, ...] = ()
+    """One line for each scene whose files could not be read."""
 
 
 def write_report(folder: Path, progress: Callable[[float], None] = lambda share: None) -> WrittenPages:
-    """Write DIR/report.html for a fit's folder; for a batch's, DIR/index.html and a page for each scene.
+    """Write report.html for the folder of a fit, or index.html and a page for each scene for a batch.
 
-    Every page is written whole or not at all. A scene of a batch whose files are damaged has no page; it
-    stands in the library's page with its reason.
+    Every page is written atomically. A scene of a batch whose files are damaged has no page. The library's
+    page lists it with the reason.
+
+    Args:
+        folder: Output folder of a fit or a batch.
+        progress: Called with the share of the work done, in [0, 1].
 
     Raises:
         InputError: the folder is neither, or a file of the fit or the batch's listing cannot be read.
@@ -38,7 +46,9 @@ def write_report(folder: Path, progress: Callable[[float], None] = lambda share:
     if is_batch_folder(folder):
         return _write_library(read_batch_folder(folder), progress)
     if not is_fit_folder(folder):
-        raise InputError(f"{folder}: neither a fit's folder (no {METRICS}) nor a batch's (no records)")
+        raise InputError(
+            f"{folder}: must be the folder of a fit, with {METRICS}, or of a batch, with records/"
+        )
     page = folder / SCENE_PAGE
     write_text_whole(page, scene_page(read_fit_folder(folder)))
     return WrittenPages((page,))
@@ -64,7 +74,7 @@ def _write_library(batch: BatchFolder, progress: Callable[[float], None]) -> Wri
 
 
 def _scene(batch: BatchFolder, name: str, record: Record) -> tuple[TunedRow | UntunedRow, Path | None]:
-    """A scene's row, and its page where it has one."""
+    """The row of a scene and the path of its page, or None if it has none."""
     folder = batch.output(record)
     if folder is None:
         if record.status == "done":

@@ -1,1 +1,1 @@
-"""The JAX surrogate: differentiable twins of the runtime's VPL gather."""
+"""The JAX surrogate: differentiable twins of the runtime's VPL gather and visibility maps."""

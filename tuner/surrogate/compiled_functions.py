@@ -1,4 +1,4 @@
-"""Keeps what JAX compiles in the user's cache folder: a second fit need not compile it again."""
+"""Cache the functions that JAX compiles in the user's cache folder, so that the next fit starts faster."""
 
 import contextlib
 import zlib
@@ -9,20 +9,21 @@ import jax
 from vpltune.tuner.reference.cache import cache_folder
 
 LEAST_SECONDS = 0.02
-"""Of compilation, below which keeping a function is not worth a file."""
+"""Functions that compile faster than this are not cached. A choice: they are not worth a file."""
 
 
 def keep_compiled_functions() -> None:
-    """From here on, compiled functions are looked for, and kept, in the cache folder."""
+    """Make JAX load compiled functions from, and store them in, the cache folder from now on."""
     drop_torn_entries(cache_folder() / "compiled")
     jax.config.update("jax_compilation_cache_dir", str(cache_folder() / "compiled"))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", LEAST_SECONDS)
 
 
 def drop_torn_entries(folder: Path) -> None:
-    """Remove entries that a killed process left half written: JAX compiles past them, but never mends them.
+    """Delete entries that a killed process left half-written. JAX ignores them but never replaces them.
 
-    JAX writes them in place, compressed with zlib where Python has no Zstandard.
+    JAX writes entries in place, compressed with zlib if Python has no Zstandard. Only zlib entries are
+    checked.
     """
     for path in folder.glob("*-cache"):
         with contextlib.suppress(OSError):

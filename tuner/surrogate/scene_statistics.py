@@ -1,5 +1,7 @@
-"""What is measured of a lit scene, from a captured frame: the twin of shaders/auto_parameters/scene_statistics.comp and
-shaders/auto_parameters/scene_statistics_ratios.comp. Names and meanings in `renderer.config.scene_statistics`."""
+"""Statistics of a lit scene from a captured frame, as defined in `renderer.config.scene_statistics`.
+
+Twins: scene_statistics.comp and scene_statistics_ratios.comp in shaders/auto_parameters/.
+"""
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -20,7 +22,7 @@ from vpltune.tuner.surrogate.vpl_visibility import map_visibility
 
 
 def scene_statistics(captured: CapturedFrame) -> Float64[np.ndarray, " statistics"]:
-    """The statistics in the order of `STATISTIC_NAMES`."""
+    """The statistics in the order of `STATISTIC_NAMES`, each in [0, 1]."""
     found = {"vpl_count": np.log2(len(captured.vpl_flux)) / 16.0, "visible": 1.0}
     if captured.vpl_flux.any():
         found |= _of_receivers(captured) | _of_lit_places(captured)
@@ -65,7 +67,7 @@ def _of_receivers(captured: CapturedFrame) -> dict[str, float]:
 
 
 def _receivers(captured: CapturedFrame) -> tuple[Int64[np.ndarray, " n"], Int64[np.ndarray, " n"]]:
-    """Which of the sequence's points meet a surface, and which of the valid pixels they meet."""
+    """The points of the R2 sequence that hit a surface, and the index of each among the valid pixels."""
     height, width = captured.valid.shape
     point = (0.5 + np.arange(RECEIVERS)[:, None] * np.array(R2_STEPS, np.float32)) % 1.0
     column, row = np.minimum((point * [width, height]).astype(int), [width - 1, height - 1]).T

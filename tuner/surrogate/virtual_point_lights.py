@@ -1,4 +1,4 @@
-"""Receivers and VPLs of one view as JAX arrays without world units."""
+"""The receivers and VPLs of one view as JAX arrays, in units of the scene length L."""
 
 from dataclasses import dataclass, field
 
@@ -13,37 +13,40 @@ from vpltune.renderer.frame.capture import CapturedFrame
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Receivers:
-    """Surface points that light falls on: positions in units of L, about the VPLs' centre."""
+    """Surface points that receive light. Positions are in units of L, relative to the centre of the VPLs."""
 
     position: Float[Array, "receivers 3"]
     normal: Float[Array, "receivers 3"]
+    """Unit length."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class VirtualPointLights:
-    """VPLs, or one of them, in the same coordinates. `flux` is in W/L²: irradiance keeps its unit, W/m²."""
+    """Many VPLs or a single one, in the coordinates of `Receivers`."""
 
     position: Float[Array, "*vpls 3"]
     normal: Float[Array, "*vpls 3"]
+    """Unit length."""
     footprint: Float[Array, "*vpls"]
     """Radius in units of L."""
     flux: Float[Array, "*vpls 3"]
+    """Flux ÷ L², so that irradiance is in W/m² although lengths are in L."""
     cells: bool = field(default=False, metadata={"static": True})
-    """Whether they shine as discs, and not as points."""
+    """Whether they are clustered disc lights instead of points."""
 
 
 def gather_inputs(
     captured: CapturedFrame, pixels: np.ndarray | None = None
 ) -> tuple[Receivers, VirtualPointLights]:
-    """The receivers and VPLs of a captured frame, centred on the VPLs and scaled by L.
+    """The receivers and VPLs of a captured frame, centred on the lit VPLs and scaled by 1/L.
 
-    In these coordinates no length has a unit, and float32's digits are spent on the distance to the lit
-    part of the scene, not to the world's origin.
+    These coordinates have no unit. Centring keeps the precision of float32 for distances within the lit part
+    of the scene instead of the distance to the world's origin.
 
     Args:
-        captured: the frame; its receivers are the valid pixels in row order.
-        pixels: indices into those valid pixels; None takes all.
+        captured: The frame. Its receivers are the valid pixels in row order.
+        pixels: Indices into those valid pixels; None for all.
     """
     selected = np.flatnonzero(captured.valid.ravel())
     if pixels is not None:
@@ -59,7 +62,8 @@ def gather_inputs(
             jnp.asarray(captured.normal_world.reshape(-1, 3)[selected], jnp.float32),
         ),
         VirtualPointLights(
-            # An empty RSM leaves VPLs without flux at the world's origin: at the centre they harm nothing.
+            # An empty RSM leaves VPLs without flux at the world's origin. Move them to the centre, where they
+            # are harmless.
             jnp.asarray(np.where(lit[:, None], (vpl_position - center) / length, 0.0), jnp.float32),
             jnp.asarray(captured.vpl_normal_world, jnp.float32),
             jnp.asarray(captured.vpl_footprint / length, jnp.float32),

@@ -1,7 +1,7 @@
-"""A cell of light as a disc, cut off at the receiver's horizon: the twin of shaders/common/vpl_disc.glsl.
+"""A clustered disc light, clipped at the receiver's horizon. Twin: shaders/common/vpl_disc.glsl.
 
-The equation and its source stand there. Every root and quotient is bounded away from what has no finite
-derivative, also where its result is not taken.
+That file has the equation and its source. Every root and quotient is clamped so that its derivative is
+finite, even where `where` discards the result.
 """
 
 import jax.numpy as jnp
@@ -12,7 +12,14 @@ from vpltune.renderer.frame.vpl_disc_bounds import FADE_HEIGHT, LEAST_PART
 
 
 def disc_past_chord(t: Float[Array, "*n"]) -> tuple[Float[Array, "*n"], Float[Array, "*n"]]:
-    """Share of a unit disc past a chord, and how far its centroid is from the middle. Twin in GLSL."""
+    """Area share and centroid of a unit disc's segment. Twin: `disc_past_chord` in GLSL.
+
+    Args:
+        t: Signed distance from the disc's centre to the chord; positive if the segment contains the centre.
+
+    Returns:
+        Share of the disc's area in the segment, in [0, 1]; distance of its centroid from the disc's centre.
+    """
     a = jnp.minimum(jnp.abs(t), 1.0 - 1e-6)
     root = jnp.sqrt(1.0 - a)
     half_chord = root * jnp.sqrt(1.0 + a)
@@ -30,14 +37,16 @@ def disc_form(
     between: Float[Array, "*n"],
     radius: Float[Array, "*m"],
 ) -> Float[Array, "*n"]:
-    """Irradiance in units of Φ/π: `disc_vector` of GLSL times the receiver's normal, where that is positive.
+    """Irradiance from a disc light in units of Φ/π, ≥ 0. Twin: `disc_vector` in GLSL, dotted with the normal.
+
+    All lengths are in units of L. c is the disc's centre and m its normal, x the receiver and n its normal.
 
     Args:
-        squared: of the distance from the receiver to the disc's middle.
-        facing: height of the middle over the receiver's horizon, n·(c − x).
-        height: of the receiver over the disc's plane, m·(x − c).
-        between: cosine of the angle between the normals.
-        radius: at least 1e-6; all lengths in units of L.
+        squared: |c − x|².
+        facing: Height of c above the receiver's horizon, n·(c − x).
+        height: Height of x above the disc's plane, m·(x − c).
+        between: Cosine of the angle between the normals, n·m.
+        radius: Radius of the disc, at least `LEAST_RADIUS`.
     """
     slope = jnp.sqrt(jnp.maximum(1.0 - between**2, 1e-12))
     share, offset = disc_past_chord(facing / (slope * radius))
@@ -45,7 +54,8 @@ def disc_form(
     lit = (fade > 0.0) & (share >= LEAST_PART)
     height = jnp.maximum(height, 0.0)
     share = jnp.maximum(share, LEAST_PART)
-    # The middle moves by `shift` along the disc's plane, straight up from the receiver's horizon.
+    # Move the centre to the centroid of the visible part: by `shift` in the disc's plane, away from the
+    # horizon.
     shift = offset * radius
     distance_squared = squared + 2.0 * shift * (facing + between * height) / slope + shift**2
     radius_squared = radius**2 * share

@@ -1,7 +1,8 @@
-"""The VPL gather in JAX: the twin of shaders/vpl_gather/vpl_gather.comp and shaders/common/vpl_irradiance.glsl.
+"""The VPL gather in JAX. Twins: shaders/vpl_gather/vpl_gather.comp and shaders/common/vpl_irradiance.glsl.
 
-Points: Keller 1997 (instant radiosity), with the point spread over its footprint: 1/d² becomes
-1/(d² + (αl)²), which for α = 1 is the exact form factor of a coaxial disc. Cells: `tuner.surrogate.vpl_disc`.
+Points follow Keller 1997 (instant radiosity), with each point spread over its footprint l: 1/d² becomes
+1/(d² + (αl)²), which for α = 1 is the exact form factor of a coaxial disc. Clustered disc lights are in
+`tuner.surrogate.vpl_disc`.
 """
 
 from collections.abc import Callable
@@ -17,28 +18,35 @@ from jaxtyping import Array, Bool, Float
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.frame.vpl_disc_bounds import LEAST_RADIUS
+from vpltune.tuner.surrogate.receiver_chunks import map_receivers
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
 from vpltune.tuner.surrogate.vpl_disc import disc_form
 
 PAIRS_AT_ONCE = 2**19
-"""Receivers times VPLs in one go: 2 MiB an array, which stays in a core's cache, for any number of VPLs."""
+"""Receivers times VPLs in one chunk. A choice: an array then takes 2 MiB and stays in a core's cache, for any
+number of VPLs."""
 
 Pairs = Float[Array, "receivers vpls"]
+"""One value for each pair of receiver and VPL."""
 Visibility = Bool[Array, "receivers vpls"] | Float[Array, "receivers vpls"]
+"""Share of each VPL's light that reaches each receiver, in [0, 1]."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class FalloffParameters:
-    """The continuous parameters of the gather; see `renderer.config.artist_parameters` for ranges and units."""
+    """The continuous parameters of the gather. Ranges and units: `renderer.config.artist_parameters`."""
 
     intensity: Float[Array, ""]
+    """k."""
     falloff_footprint: Float[Array, ""]
+    """α."""
     extinction_coefficient: Float[Array, ""]
+    """κ."""
 
     @classmethod
     def of(cls, parameters: ArtistParameters) -> "FalloffParameters":
-        """Those of a config."""
+        """The falloff parameters of a config."""
         return cls(
             jnp.float32(parameters.intensity),
             jnp.float32(parameters.falloff_footprint),
@@ -52,9 +60,9 @@ def vpl_irradiance(
     vpl: VirtualPointLights,
     parameters: FalloffParameters,
 ) -> Float[Array, "3"]:
-    """Irradiance of one VPL at one receiver, lengths in units of L. Twin: `vpl_irradiance` in GLSL."""
+    """Irradiance [W/m²] of one VPL at one receiver, lengths in units of L. Twin: `vpl_irradiance` in GLSL."""
     to_vpl = vpl.position - position
-    # As in `pair_forms`.
+    # The clamp is that of `pair_forms`.
     squared = jnp.maximum(jnp.dot(to_vpl, to_vpl), 1e-18)
     facing, height = jnp.dot(normal, to_vpl), -jnp.dot(vpl.normal, to_vpl)
     footprint = parameters.falloff_footprint * vpl.footprint
@@ -70,7 +78,7 @@ def vpl_irradiance(
 def gather_pairwise(
     receivers: Receivers, vpls: VirtualPointLights, parameters: FalloffParameters
 ) -> Float[Array, "receivers 3"]:
-    """The gather as its definition reads, pair by pair: what `gather` is tested and timed against."""
+    """The gather [W/m²], pair by pair, as it is defined. Tests and benchmarks compare `gather` with it."""
 
     def at(position: Float[Array, "3"], normal: Float[Array, "3"]) -> Float[Array, "3"]:
         each = jax.vmap(vpl_irradiance, in_axes=(None, None, 0, None))
@@ -80,23 +88,25 @@ def gather_pairwise(
 
 
 def vpl_axes(vpls: VirtualPointLights) -> Float[Array, "6 vpls"]:
-    """The axes of their positions, then of their normals, each on its own."""
+    """x, y and z of the positions, then of the normals, one row each."""
     return jnp.concatenate([vpls.position.T, vpls.normal.T])
 
 
 def pair_forms(
     receivers: Receivers, vpls: VirtualPointLights, axes: Float[Array, "6 vpls"]
 ) -> tuple[Pairs, Callable[[Array], Pairs]]:
-    """Squared distances, and what gives each pair's irradiance, in units of Φ/π, for an α.
+    """Squared distance of each pair, and a function from α to each pair's irradiance in units of Φ/π.
 
-    Written axis by axis, so that XLA fuses it all into one loop and no array of [receivers, vpls, 3] is made.
-    That is as fast as |x|² + |v|² − 2 x·v from a matrix product, whose three axes are too few to gain by, and
-    does not cancel: near contacts the matrix form lost three digits (1e-6 became 2e-3 relative RMSE).
+    It is written axis by axis, so that XLA fuses it into one loop without an array [receivers, vpls, 3]. This
+    is as fast as |x|² + |v|² − 2 x·v with a matrix product, because three axes are too few for that to pay
+    off. And it has no cancellation: near contacts, the matrix form lost three digits (relative RMSE 2e-3
+    instead of 1e-6).
 
     Args:
-        receivers, vpls: in units of L.
-        axes: `vpl_axes(vpls)`, made outside of any loop over receivers, which would pick axes out of
-            [vpls, 3] again for every few pairs.
+        receivers: Receivers, in units of L.
+        vpls: VPLs, in units of L.
+        axes: `vpl_axes(vpls)`. Compute it outside any loop over receivers, which would otherwise extract the
+            axes from [vpls, 3] again for every few pairs.
     """
     squared = facing = height = between = jnp.zeros(())
     for axis in range(3):
@@ -106,8 +116,8 @@ def pair_forms(
         facing = facing + normal * to_vpl
         height = height - vpl_normal * to_vpl
         between = between + normal * vpl_normal
-    # Keeps quotients finite where receiver and VPL coincide; both cosines are 0 there. 1e-18 and not less:
-    # XLA may turn x/y/y into x/(y·y), and that square must still be a float32.
+    # The clamp keeps quotients finite where receiver and VPL coincide; both cosines are 0 there. It cannot be
+    # smaller than 1e-18: XLA may turn x/y/y into x/(y·y), and y·y must still be a normal float32.
     squared = jnp.maximum(squared, 1e-18)
     if vpls.cells:
 
@@ -120,24 +130,20 @@ def pair_forms(
     return squared, lambda falloff_footprint: cosines / (squared + (falloff_footprint * vpls.footprint) ** 2)
 
 
-def receivers_at_once(vpls: int, pairs: int) -> int:
-    """How many receivers' pairs with all VPLs are about `pairs`: a power of two, at least 1."""
-    return 2 ** max((pairs // max(vpls, 1)).bit_length() - 1, 0)
-
-
 def gather(
     receivers: Receivers,
     vpls: VirtualPointLights,
     parameters: FalloffParameters,
     visibility: Visibility | None = None,
 ) -> Float[Array, "receivers 3"]:
-    """Indirect irradiance [W/m²] at every receiver from all VPLs.
+    """Indirect irradiance [W/m²] at each receiver from all VPLs.
 
     Args:
-        receivers, vpls: in units of L (see `tuner.surrogate.virtual_point_lights.gather_inputs`).
-        parameters: k, α, κ.
-        visibility: share of each VPL's light that reaches each receiver; None takes all of it, as the
-            runtime does without visibility maps.
+        receivers: Receivers, in units of L (see `tuner.surrogate.virtual_point_lights.gather_inputs`).
+        vpls: VPLs, in units of L.
+        parameters: k, α and κ.
+        visibility: Share of each VPL's light that reaches each receiver, in [0, 1]; None for all of it, as in
+            the runtime without visibility maps.
     """
     scene, structure = jax.tree.flatten((receivers, vpls, visibility))
     image = _image(structure, parameters.falloff_footprint, parameters.extinction_coefficient, *scene)
@@ -146,7 +152,7 @@ def gather(
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
 def _image(structure: PyTreeDef, footprint: Array, transmittance: Array, *scene: Array) -> Array:
-    """The gather for k = π; `scene` and its structure: receivers, VPLs and visibility."""
+    """The gather for k = π. `scene` and `structure` are the flattened receivers, VPLs and visibility."""
     return _weighted_flux(partial(_weight, footprint, transmittance), *structure.unflatten(scene))
 
 
@@ -154,11 +160,11 @@ def _image(structure: PyTreeDef, footprint: Array, transmittance: Array, *scene:
 def _image_jvp(
     structure: PyTreeDef, primals: tuple[Array, ...], tangents: tuple[Array | SymbolicZero, ...]
 ) -> tuple[Array, Array]:
-    """What α and κ do to the image is one more gather each. Reverse mode through every pair takes longer
-    than all three, most of all for discs."""
+    """The derivatives by α and κ, one more gather each. Reverse mode through all pairs takes longer than
+    these three gathers, most of all for discs."""
     moving = [index for index, tangent in enumerate(tangents) if not isinstance(tangent, SymbolicZero)]
     if any(index > 1 for index in moving):
-        # The scene moves as well.
+        # The scene is differentiated as well, so use JAX's own rule.
         def image(*moved: Array) -> Array:
             values = dict(enumerate(primals)) | dict(zip(moving, moved, strict=True))
             return _image.fun(structure, *values.values())
@@ -185,7 +191,7 @@ def _derivative(function: Callable[[Array], Pairs], value: Array) -> Pairs:
 
 
 def _weight(footprint: Array, transmittance: Array, squared: Pairs, form: Callable[[Array], Pairs]) -> Pairs:
-    """What each pair counts of the VPL's flux."""
+    """The factor on the VPL's flux for each pair, for k = π."""
     return form(footprint) * jnp.exp(-transmittance * jnp.sqrt(squared))
 
 
@@ -195,28 +201,17 @@ def _weighted_flux(
     vpls: VirtualPointLights,
     visibility: Visibility | None,
 ) -> Float[Array, "receivers 3"]:
-    """The sum of the VPLs' flux at every receiver, weighed by what is made of `pair_forms`."""
-    count = receivers.position.shape[0]
-    chunk_size = min(receivers_at_once(vpls.position.shape[0], PAIRS_AT_ONCE), max(count, 1))
-    padding = ((0, -count % chunk_size), (0, 0))
+    """Σ weight · flux over the VPLs at each receiver; `weight_of` takes the results of `pair_forms`."""
     axes = vpl_axes(vpls)
 
-    def chunked(values: Array) -> Array:
-        return jnp.pad(values, padding).reshape(-1, chunk_size, values.shape[1])
-
-    # Made anew for its gradient: kept, all pairs of all chunks would be written out and read back, which took
-    # forty times as long and memory that grows with their number.
+    # Recompute the chunk for its gradient. Storing all pairs of all chunks would take memory in proportion to
+    # their number, and took forty times as long.
     @partial(jax.checkpoint, prevent_cse=False)
-    def of_chunk(chunk: tuple[Array, Array, Array | None]) -> Array:
-        position, normal, visible = chunk
+    def of_chunk(position: Array, normal: Array, visible: Array | None) -> Array:
         weight = weight_of(*pair_forms(Receivers(position, normal), vpls, axes))
         if visible is not None:
             weight = weight * visible
         return jnp.matmul(weight, vpls.flux, precision=jax.lax.Precision.HIGHEST)
 
-    inputs = (
-        chunked(receivers.position),
-        chunked(receivers.normal),
-        None if visibility is None else chunked(visibility),
-    )
-    return jax.lax.map(of_chunk, inputs).reshape(-1, 3)[:count]
+    arrays = (receivers.position, receivers.normal, visibility)
+    return map_receivers(of_chunk, arrays, vpls.position.shape[0], PAIRS_AT_ONCE)

@@ -1,4 +1,4 @@
-"""What VPLs see, from their visibility maps, in JAX: the twin of shaders/common/vpl_visibility.glsl."""
+"""VPL visibility from visibility maps, in JAX. Twin: shaders/common/vpl_visibility.glsl."""
 
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
@@ -18,42 +18,44 @@ from vpltune.renderer.frame.visibility_map_layout import (
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
 
 CHUNK = 128
-"""Receivers at once: 128 × 1,024 pairs are half a MiB an array, nine with vectors."""
+"""Receivers in one chunk. A choice: with 1,024 VPLs, one value for each pair takes half a MiB."""
 _PADDINGS = 4
-"""Of the room for blocks: in steps of so many-th parts of the texels."""
+"""The fine texels are padded in steps of 1/`_PADDINGS` of the number of coarse texels. A choice."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class VisibilityParameters:
-    """bias: of the distance, how far two surfaces may overlap before one shades the other. softness: of the
-    distance, over which light then fades out."""
+    """The parameters of the visibility test, as shares of the distance between map and receiver."""
 
     bias: Float[Array, ""]
+    """β: an overlap of up to this casts no shadow."""
     softness: Float[Array, ""]
+    """σ: beyond the bias, light fades to zero over this overlap."""
 
     @classmethod
     def of(cls, parameters: ArtistParameters) -> "VisibilityParameters":
-        """Those of a config."""
+        """The visibility parameters of a config."""
         return cls(jnp.float32(parameters.visibility_bias), jnp.float32(parameters.visibility_softness))
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class MapTexels:
-    """All texels of all maps, VPL by VPL and row by row, then those of all blocks; in each VPL's frame."""
+    """Coarse texels, VPL by VPL and row by row, then the fine texels of all blocks; in each VPL's frame."""
 
     end: Float[Array, "texels 3"]
-    """Where the ray ended, from the map's origin [L]."""
+    """End of the ray, relative to the map's origin [L]."""
     normal: Float[Array, "texels 3"]
+    """Normal of the surface that the ray hit."""
     block_start: Int[Array, "vpls size size"]
-    """Where the finer texels begin that stand for this one; -1 where none do."""
+    """Index of the first fine texel in the block of this coarse texel; -1 if it has none."""
     refinement: int = field(metadata={"static": True})
-    """Texels along the side of a block."""
+    """Fine texels along the side of a block."""
 
 
 def hemi_octahedral_encode(direction: Float[Array, "*n 3"]) -> Float[Array, "*n 2"]:
-    """Unit vectors of the upper hemisphere on [-1, 1]² (Cigolle et al. 2014, "hemi-oct"). Twin in GLSL."""
+    """Unit vectors of the upper hemisphere to [-1, 1]² (Cigolle et al. 2014, "hemi-oct"). Twin in GLSL."""
     p = direction[..., :2] / (jnp.abs(direction[..., :2]).sum(-1, keepdims=True) + direction[..., 2:])
     return jnp.stack([p[..., 0] + p[..., 1], p[..., 0] - p[..., 1]], axis=-1)
 
@@ -78,7 +80,7 @@ def hemisphere_frame(normal: Float[Array, "vpls 3"]) -> Float[Array, "vpls 3 3"]
 
 
 def map_texels(maps: VisibilityMaps) -> MapTexels:
-    """A frame's maps as `vpl_visibility` takes them."""
+    """Convert the maps of a frame to the form that `vpl_visibility` takes."""
     size, refinement = maps.distance.shape[1], maps.block_distance.shape[1]
     end = _axes(size)[None] * maps.distance[..., None]
     _, row, column = np.nonzero(maps.block >= 0)
@@ -86,7 +88,7 @@ def map_texels(maps: VisibilityMaps) -> MapTexels:
     fine_row = (row[:, None] * refinement + inside)[:, :, None]
     fine_column = (column[:, None] * refinement + inside)[:, None, :]
     block_end = _axes(size * refinement)[fine_row, fine_column] * maps.block_distance[..., None]
-    # Frames have differing numbers of blocks; padding makes them few, so that little is compiled anew.
+    # The number of blocks varies between frames. Pad it to one of a few sizes, so that little is recompiled.
     padding = ((0, -block_end.size // 3 % (1 + maps.distance.size // _PADDINGS)), (0, 0))
     return MapTexels(
         _joined(end, np.pad(block_end.reshape(-1, 3), padding)),
@@ -98,8 +100,9 @@ def map_texels(maps: VisibilityMaps) -> MapTexels:
 
 @lru_cache
 def _axes(size: int) -> Float32[np.ndarray, "size size 3"]:
-    """Directions of a map's texels. Twin: `visibility_axis` in GLSL."""
-    # In numpy, as `hemi_octahedral_decode`: array by array, JAX would compile each operation for itself.
+    """Directions of the texels of a map. Twin: `visibility_axis` in GLSL."""
+    # This is `hemi_octahedral_decode` in numpy: outside of `jit`, JAX would compile each operation
+    # separately.
     centers = (np.arange(size, dtype=np.float32) + np.float32(0.5)) * np.float32(2.0 / size) - np.float32(1.0)
     u, v = np.meshgrid(centers, centers)
     x, y = (u + v) / 2.0, (u - v) / 2.0
@@ -116,7 +119,7 @@ def _joined(
 def map_visibility(
     captured: CapturedFrame, receivers: Receivers, vpls: VirtualPointLights, parameters: ArtistParameters
 ) -> Float[Array, "receivers vpls"] | None:
-    """What the runtime takes the visibility to be: from the frame's maps, or None where it has none."""
+    """The visibility in the runtime's frame, in [0, 1], from its visibility maps; None if it has no maps."""
     if captured.visibility_maps is None:
         return None
     texels = map_texels(captured.visibility_maps)
@@ -132,12 +135,12 @@ def vpl_visibility(
 
 
 def seen_share(overlap: Float[Array, "*shape"], parameters: VisibilityParameters) -> Float[Array, "*shape"]:
-    """Share of the light that passes a surface which overlaps the receiver by so much."""
+    """Share of the light that passes a surface with this overlap: 1 − clamp((overlap − β)/σ, 0, 1)."""
     return 1.0 - jnp.clip((overlap - parameters.bias) / parameters.softness, 0.0, 1.0)
 
 
 def visibility_origin(vpls: VirtualPointLights) -> Float[Array, "vpls 3"]:
-    """Where the rays of each VPL's map start [L]. Twin in GLSL."""
+    """Origin of the rays of each VPL's map [L]. Twin in GLSL."""
     lift = jnp.maximum(VISIBILITY_LIFT * vpls.footprint, VISIBILITY_LEAST_LIFT)
     return vpls.position + lift[:, None] * vpls.normal
 
@@ -146,14 +149,17 @@ def visibility_origin(vpls: VirtualPointLights) -> Float[Array, "vpls 3"]:
 def surface_overlap(
     receivers: Receivers, vpls: VirtualPointLights, texels: MapTexels
 ) -> Float[Array, "receivers vpls"]:
-    """By how much, of the distance, what a VPL sees in a receiver's direction overlaps the receiver.
+    """Overlap of each receiver with the surface that each VPL sees towards it, as a share of the distance.
 
-    What the ray nearest to the receiver's direction met stands so far before the receiver's tangent plane
-    (receiver plane depth bias, Isidoro 2006), and the receiver so far behind its own: the lesser of the two.
-    Negative where nothing is between them, and -1 where no light passes anyway.
+    The surface is the one that the map's nearest ray hit. The overlap is the smaller of two distances: from
+    the end of that ray to the receiver's tangent plane (receiver plane depth bias, Isidoro 2006), and from
+    the receiver to the surface's tangent plane. It is negative if nothing is in between, and -1 if the pair
+    exchanges no light anyway.
 
     Args:
-        receivers, vpls: lengths in units of L.
+        receivers: Receivers, in units of L.
+        vpls: VPLs, in units of L.
+        texels: The maps of the VPLs.
     """
     size, refinement = texels.block_start.shape[1], texels.refinement
     block_start = texels.block_start.reshape(-1)
@@ -167,7 +173,7 @@ def surface_overlap(
         to_receiver = in_frame(position[:, None, :] - origin[None, :, :], frame)
         normal = jnp.einsum("rk,vak->rva", normal_world, frame, precision="highest")
         asked = (to_receiver[..., 2] > 0.0) & ((to_receiver * normal).sum(-1) < 0.0)
-        # Where not asked, any finite direction serves.
+        # Pairs that exchange no light get any finite direction.
         to_receiver = jnp.where(asked[..., None], to_receiver, jnp.array([0.0, 0.0, 1.0]))
         place = (hemi_octahedral_encode(to_receiver) * 0.5 + 0.5) * size
         texel = jnp.minimum(place.astype(jnp.int32), size - 1)

@@ -1,8 +1,8 @@
-"""Loops over pairs of receivers and VPLs, compiled for the widest vectors that the processor has.
+"""`jax.jit` for loops over pairs of receivers and VPLs, with the widest vectors of the processor.
 
-LLVM stays at 256 bits where a processor has 512, for the sake of code that seldom needs them. The gather, its
-gradient and discs are faster with all of them; what picks texels of maps, or sums with hardly any arithmetic,
-is not.
+LLVM prefers 256-bit vectors even where a processor has 512-bit ones, which is better for code that rarely
+uses them. The gather, its gradient and the disc lights are faster with 512 bits. Lookups in visibility maps,
+and sums with little arithmetic, are not.
 """
 
 from collections.abc import Callable
@@ -11,18 +11,18 @@ from typing import ParamSpec, TypeVar
 
 import jax
 
-P = ParamSpec("P")
-R = TypeVar("R")
+P = ParamSpec("P")  # parameters of a function
+R = TypeVar("R")  # its result
 
 WIDEST = {"xla_cpu_prefer_vector_width": 512}
-"""Bits. Processors that have fewer go by what they have, and GPUs by their own."""
+"""XLA's preferred vector width in bits. Processors with narrower vectors use theirs, and GPUs ignore it."""
 
 
 def wide_jit(function: Callable[P, R]) -> Callable[P, R]:
     """`jax.jit` with the widest vectors.
 
-    JAX takes such options of the outermost function only: what calls this under a transformation or in a
-    function to be compiled must call the plain one (`__wrapped__`).
+    JAX accepts such options only for the outermost function. Inside a transformation or another compiled
+    function, call the plain function, `__wrapped__`.
     """
 
     @wraps(function)
@@ -39,7 +39,7 @@ def _compiled(function: Callable) -> Callable:
 
 @cache
 def _options() -> dict[str, int] | None:
-    """None where this version of XLA has another name for it."""
+    """`WIDEST`, or None if this version of XLA does not know the option."""
     try:
         jax.jit(lambda: 0, compiler_options=WIDEST)()
     except jax.errors.JaxRuntimeError:

@@ -1,19 +1,22 @@
-// --- what is on the page, and what keys and pointers do -----------------------------------------------------------
+// --- the page's controls: buttons, sliders, keys and pointer. Follows page.js in one script. ----------------------
 const element = (id) => document.getElementById(id);
+// The parameters that have a slider.
 const LIVE = ["intensity", "falloff_footprint", "extinction_coefficient", "density_exponent"];
 
+// The state of the page (camera, lights, parameters, exposure) and when to draw.
 class Page {
   constructor(frame) {
     this.frame = frame;
-    this.exposure = null;
+    this.exposure = null;  // measured once the image is complete
     this.chosenLight = 0;
-    this.waiting = [];
+    this.waiting = [];     // promises to resolve when the image is complete
     this.makeParameters();
     this.makeLights();
     this.listen();
     this.reset();
   }
 
+  // The exported camera, lights and parameters.
   reset() {
     this.camera = clone(bundle.view.camera_to_world);
     this.lights = clone(bundle.lights);
@@ -26,7 +29,7 @@ class Page {
     this.choose(bundle.config.parameters, "tuned");
   }
 
-  // Take a set of parameters; VPLs are counted as the export has them, so that both are at one cost.
+  // Use a set of parameters, with the export's VPL count, so that tuned and default cost the same.
   choose(parameters, name) {
     this.parameters = { ...parameters, vpl_count: bundle.config.parameters.vpl_count };
     for (const id of ["tuned", "default"]) element(id).setAttribute("aria-pressed", String(id === name));
@@ -34,7 +37,7 @@ class Page {
     this.change({ light: true });
   }
 
-  // Draw anew: with other VPLs, from another place, or only with other parameters.
+  // Schedule a new image. `light`: VPLs must be drawn again; `camera`: the view has changed; neither: only parameters.
   change({ light = false, camera = false }) {
     this.lightChanged = this.lightChanged || light;
     this.cameraChanged = this.cameraChanged || camera || light;
@@ -42,6 +45,7 @@ class Page {
     if (!this.asked) this.asked = requestAnimationFrame(() => this.step());
   }
 
+  // One animation frame: bring everything up to date, gather one batch of VPLs, show the image.
   step() {
     this.asked = 0;
     const { vpl_count, density_importance } = this.parameters;
@@ -54,7 +58,7 @@ class Page {
       this.frame.gather(this.camera, this.parameters, this.gathered, end);
       this.gathered = end;
     }
-    // The table's points are as evenly spread in every prefix: some VPLs, brightened, stand for all.
+    // Every prefix of the point table is evenly spread: the VPLs gathered so far, scaled up, stand for all.
     this.frame.resolve(vpl_count / this.gathered);
     const finished = this.gathered === vpl_count;
     if (this.exposure === null && finished) this.exposure = this.frame.measuredExposure();
@@ -64,19 +68,22 @@ class Page {
     else this.waiting.splice(0).forEach((resolve) => resolve());
   }
 
+  // A promise that resolves when the image is complete.
   finished() {
     return this.asked ? new Promise((resolve) => this.waiting.push(resolve)) : Promise.resolve();
   }
 
+  // Turn the camera about the point that it looks at [radians].
   orbit(yaw, pitch) {
     const pivot = add(column(this.camera, 3), column(this.camera, 2), -this.distance);
     const up = column(this.camera, 2)[1] * Math.sign(-pitch);
     this.camera = turned(this.camera, pivot, [0, 1, 0], yaw);
-    // Not over the pole, where up would turn over.
+    // Stop before the pole, where the image would flip.
     if (up > -0.98) this.camera = turned(this.camera, pivot, column(this.camera, 0), pitch);
     this.change({ camera: true });
   }
 
+  // Multiply the camera's distance from its pivot.
   approach(factor) {
     const step = this.distance * (1 - factor);
     const moved = add(column(this.camera, 3), column(this.camera, 2), -step);
@@ -85,7 +92,7 @@ class Page {
     this.change({ camera: true });
   }
 
-  // Right, up and backward as the camera has them, in shares of the diagonal.
+  // Move the chosen light along the camera's right, up and backward axes, in units of the scene's diagonal.
   moveLight(right, up, backward) {
     let by = [0, 0, 0];
     [right, up, backward].forEach((amount, i) => { by = add(by, column(this.camera, i), amount); });
@@ -94,6 +101,7 @@ class Page {
     this.change({ light: true });
   }
 
+  // One slider for each live parameter.
   makeParameters() {
     for (const spec of bundle.table.filter((row) => LIVE.includes(row.name))) {
       const label = document.createElement("label");
@@ -124,6 +132,7 @@ class Page {
     element(`${name}-value`).textContent = `${value.toPrecision(3)} ${spec.unit === "1" ? "" : spec.unit}`;
   }
 
+  // One button for each light.
   makeLights() {
     this.lights = clone(bundle.lights);
     bundle.lights.forEach((light, i) => {
@@ -175,7 +184,7 @@ class Page {
     };
     document.addEventListener("keydown", (event) => {
       const action = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
-      // A focused slider has the arrows.
+      // A focused slider uses the arrow keys itself.
       if (!action || event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === "INPUT") return;
       event.preventDefault();
       action();
@@ -194,6 +203,7 @@ class Page {
   }
 }
 
+// The texts that come from the bundle: names may hold any characters and are never parsed as HTML.
 function describe() {
   element("name").textContent = bundle.scene;
   element("note").textContent = bundle.note;
@@ -209,7 +219,7 @@ function describe() {
 async function start() {
   describe();
   if (!gl) throw new Error("this browser has no WebGL 2");
-  if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("this graphics driver draws no float images");
+  if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("this graphics driver cannot draw into float textures");
   const frame = new Frame(makeScene(await binaryBytes()));
   window.vpltune = new Page(frame);
   await window.vpltune.finished();

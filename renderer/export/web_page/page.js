@@ -1,11 +1,14 @@
 "use strict";
-// Draws the exported scene as the runtime does: G-buffer, RSM, VPLs, gather, direct light, tone curve. VPLs are made
-// anew only when the light moves, or the camera where they are placed by what it sees; they are gathered a batch at a
-// time, so that a slow machine stays answerable.
+// The renderer of the exported page, in WebGL 2. It draws what the runtime draws: G-buffer, RSM, VPLs, gather, direct
+// light, tone curve. Reads three elements of the page: `bundle` (the document), `binary` (its arrays) and `shaders`
+// (sources from shaders/web/). Owner: web_page.py. The page's controls are in controls.js.
+//
+// VPLs are drawn again only when a light moves, or, with VPL importance, when the camera moves. Each animation frame
+// gathers one batch of VPLs, so that the page stays responsive on a slow machine.
 
 const bundle = JSON.parse(document.getElementById("bundle").textContent);
 const shaders = JSON.parse(document.getElementById("shaders").textContent);
-const BATCH = 32;
+const BATCH = 32;  // VPLs gathered in one animation frame; a choice
 const FULLSCREEN = "web/fullscreen.vert";
 
 async function binaryBytes() {
@@ -15,7 +18,7 @@ async function binaryBytes() {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-// --- vectors and matrices; matrices are rows, as mathematics writes them ------------------------------------------
+// --- vectors and matrices; a matrix is an array of its rows -------------------------------------------------------
 const add = (a, b, scale = 1) => a.map((value, i) => value + scale * b[i]);
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -23,16 +26,19 @@ const normalized = (a) => a.map((value) => value / Math.hypot(...a));
 const column = (matrix, i) => [matrix[0][i], matrix[1][i], matrix[2][i]];
 const transposed = (matrix) => matrix[0].map((_, i) => matrix.map((row) => row[i]));
 const columnMajor = (matrix) => new Float32Array(transposed(matrix).flat());
+// The inverse of a rotation with a translation.
 function rigidInverse(matrix) {
   const axes = [0, 1, 2].map((i) => column(matrix, i));
   return [...axes.map((axis) => [...axis, -dot(axis, column(matrix, 3))]), [0, 0, 0, 1]];
 }
-function rotated(vector, axis, angle) {  // Rodrigues
+// A vector turned about a unit axis through the origin (Rodrigues' rotation formula).
+function rotated(vector, axis, angle) {
   const [c, s] = [Math.cos(angle), Math.sin(angle)];
   const along = dot(axis, vector) * (1 - c);
   const across = cross(axis, vector);
   return vector.map((value, i) => value * c + across[i] * s + axis[i] * along);
 }
+// A rigid matrix turned about an axis through `center`.
 function turned(matrix, center, axis, angle) {
   const columns = [0, 1, 2].map((i) => rotated(column(matrix, i), axis, angle));
   columns.push(add(center, rotated(add(column(matrix, 3), center, -1), axis, angle)));
@@ -44,6 +50,7 @@ const canvas = document.getElementById("image");
 [canvas.width, canvas.height] = bundle.view.size;
 const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, preserveDrawingBuffer: true });
 
+// A linked program with its uniforms' types and locations; the names are keys of `shaders`.
 function makeProgram(vertex, fragment) {
   const program = gl.createProgram();
   for (const [kind, name] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
@@ -76,7 +83,7 @@ const SETTERS = {
   [WebGL2RenderingContext.FLOAT_MAT4]: (place, value) => gl.uniformMatrix4fv(place, false, columnMajor(value)),
 };
 
-// Use a program with its uniforms; a texture among them gets a unit of its own.
+// Use a program and set its uniforms by name. Each texture gets a texture unit; values without a uniform are skipped.
 function use({ program, uniforms }, values) {
   gl.useProgram(program);
   let unit = 0;
@@ -101,7 +108,7 @@ function floatTexture(width, height, format) {
   return texture;
 }
 
-// Textures of the given formats, to be drawn into together.
+// A framebuffer with one texture for each format, and optionally a depth buffer.
 function makeTarget(width, height, formats, withDepth = false) {
   const textures = formats.map((format) => floatTexture(width, height, format));
   const framebuffer = gl.createFramebuffer();
@@ -115,10 +122,11 @@ function makeTarget(width, height, formats, withDepth = false) {
     gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, depth);
   }
   gl.drawBuffers(places);
-  if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE) throw new Error("float targets are missing");
+  if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE) throw new Error("no float render targets");
   return { width, height, textures, framebuffer, withDepth };
 }
 
+// Run a fragment shader on every texel of a target, or on the canvas.
 function fill(target, program, values) {
   gl.bindFramebuffer(gl.FRAMEBUFFER, target ? target.framebuffer : null);
   gl.viewport(0, 0, target ? target.width : canvas.width, target ? target.height : canvas.height);
@@ -129,13 +137,14 @@ function fill(target, program, values) {
 }
 
 // --- the scene ----------------------------------------------------------------------------------------------------
-// Every triangle with corners of its own, so that they can carry its plane.
+// Vertex attributes without sharing between triangles, so that each vertex can carry its triangle's plane.
 function unshared(values, corners, width) {
   const result = new Float32Array(width * corners.length);
   corners.forEach((vertex, i) => { for (let k = 0; k < width; ++k) result[width * i + k] = values[width * vertex + k]; });
   return result;
 }
 
+// The unit normal of each triangle, once for each of its corners.
 function planeNormals(positions) {
   const result = new Float32Array(positions.length);
   for (let i = 0; i < positions.length; i += 9) {
@@ -147,6 +156,7 @@ function planeNormals(positions) {
   return result;
 }
 
+// Vertex buffers and textures of the scene; `bytes` is the decompressed binary.
 function makeScene(bytes) {
   const part = (name) => bytes.subarray(bundle.arrays[name].offset, bundle.arrays[name].offset + bundle.arrays[name].bytes);
   const vertices = gl.createVertexArray();
@@ -169,7 +179,7 @@ function makeScene(bytes) {
     const texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    // SRGB8 has no mipmaps made for it in WebGL 2; with an alpha of 255 it has.
+    // WebGL 2 cannot generate mipmaps for SRGB8, only for SRGB8_ALPHA8: add an alpha of 255.
     const rgba = new Uint8Array(entry.size[0] * entry.size[1] * 4).fill(255);
     for (let i = 0; i < rgba.length / 4; ++i) rgba.set(bytes.subarray(entry.offset + 3 * i, entry.offset + 3 * i + 3), 4 * i);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.SRGB8_ALPHA8, ...entry.size, 0, gl.RGBA, gl.UNSIGNED_BYTE, rgba);
@@ -185,7 +195,7 @@ function makeScene(bytes) {
   return { vertices, textures, bytes: part };
 }
 
-// Draw all triangles as seen along −Z of a rigid matrix; the target's depth is reversed.
+// Draw all triangles from a camera or light face: `toWorld` is rigid and looks along −Z. Depth is reversed.
 function drawScene(scene, program, toWorld, extent, orthographic, values) {
   const [x, y, z, one] = rigidInverse(toWorld);
   const scaled = (row, by) => row.map((value) => value / by);
@@ -200,6 +210,7 @@ function drawScene(scene, program, toWorld, extent, orthographic, values) {
   }
 }
 
+// Set all textures and the depth of a target to 0.
 function clear(target) {
   gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
   target.textures.forEach((_, i) => gl.clearBufferfv(gl.COLOR, i, [0, 0, 0, 0]));
@@ -211,6 +222,7 @@ const KINDS = { spot: 0, point: 1, directional: 2 };
 const center = [0, 1, 2].map((i) => (bundle.bounds[0][i] + bundle.bounds[1][i]) / 2);
 const clone = (value) => JSON.parse(JSON.stringify(value));
 
+// The bytes of the uniform blocks `Lights` and `RsmFaces` of shaders/common/lights.glsl (64 and 96 bytes an element).
 function lightBlocks(lights, faces) {
   const light = new DataView(new ArrayBuffer(64 * lights.length));
   const face = new DataView(new ArrayBuffer(96 * faces.length));
@@ -230,7 +242,7 @@ function lightBlocks(lights, faces) {
   return [light, face];
 }
 
-// Move one light by a vector in units of the scene's diagonal; a sun turns instead, about the scene's middle.
+// Move one light by a vector in units of the scene's diagonal. A directional light turns about the scene's centre.
 function moveLight(state, index, by) {
   const light = state.lights[index];
   if (light.type !== "directional") {
@@ -246,7 +258,7 @@ function moveLight(state, index, by) {
   light.direction = normalized(rotated(rotated(light.direction, [0, 1, 0], yaw), sideways, pitch));
   for (const face of state.faces.filter((other) => other.light === index)) {
     face.light_to_world = turned(turned(face.light_to_world, center, [0, 1, 0], yaw), center, sideways, pitch);
-    // Whichever way it turns, it now holds the whole scene.
+    // A face that holds the whole scene from every direction: half the diagonal, with 1 % to spare.
     const half = bundle.diagonal * 0.505;
     face.extent = [half, half];
     face.near_or_range = 2 * half;
@@ -255,6 +267,7 @@ function moveLight(state, index, by) {
 }
 
 // --- the frame ----------------------------------------------------------------------------------------------------
+// The targets and programs of one frame; `draw…` and `gather` fill them.
 class Frame {
   constructor(scene) {
     this.scene = scene;
@@ -299,6 +312,7 @@ class Frame {
     this.blocks = [0, 1].map(() => gl.createBuffer());
   }
 
+  // The R2 sequence of renderer/frame/point_table.py, one point for each texel.
   makePointTable(width, height) {
     const points = new Float32Array(2 * width * height);
     for (let i = 0; i < points.length; ++i) {
@@ -310,7 +324,7 @@ class Frame {
     return texture;
   }
 
-  // A tree of boxes over the triangles, and room for a small map of what each VPL sees.
+  // Textures for the tree of boxes over the triangles, and targets for the VPLs' visibility maps.
   makeVisibility(most) {
     const columns = bundle.data_columns;
     this.rays = { longest: bundle.diagonal };
@@ -333,6 +347,7 @@ class Frame {
     }
   }
 
+  // Cast the visibility maps, then finer texels at silhouettes.
   castVisibility(vpl_count) {
     const values = { ...this.rays, ...this.vplValues(this.vpls), ...this.momentSums, vpl_count };
     fill(this.castMaps ?? this.visibility, this.programs.vpl_visibility_maps, values);
@@ -355,6 +370,7 @@ class Frame {
     return { gbuffer_normal, gbuffer_albedo, gbuffer_depth, camera_to_world: camera, tan_half_fov, near_plane };
   }
 
+  // Draw the RSM atlas, one face after another.
   drawLights(state) {
     lightBlocks(state.lights, state.faces).forEach((block, i) => {
       gl.bindBuffer(gl.UNIFORM_BUFFER, this.blocks[i]);
@@ -374,7 +390,7 @@ class Frame {
     });
   }
 
-  // VPLs by the light that is seen in the RSM, and by what the camera sees.
+  // Draw VPLs from the RSM, weighted by importance for the camera if the config asks for it, and cast their maps.
   drawVpls(state, parameters) {
     if (this.importance && parameters.density_importance > 0) this.measureImportance(state.camera);
     this.sumWeights(state, parameters);
@@ -385,7 +401,7 @@ class Frame {
     if (this.visibility) this.castVisibility(vpl_count);
   }
 
-  // A factor of the chance to draw each cell of the RSM, before its power is taken: what the camera would miss.
+  // Importance of each cell of the RSM: how much the camera would miss without its light. The exponent η comes later.
   measureImportance(camera) {
     const { vpl_importance_cells, vpl_importance_receivers, vpl_importance, vpl_importance_mean } = this.programs;
     fill(this.importanceCells, vpl_importance_cells, this.rsmValues);
@@ -402,14 +418,14 @@ class Frame {
     return { ...this.rsmValues, density_exponent, density_importance, importance, mean_importance };
   }
 
-  // So many VPLs, which share all light among them.
+  // Draw `vpl_count` VPLs into a target; together they carry all the light.
   placeVpls(target, parameters, vpl_count) {
     const sums = { sums_in_rows: this.sumsInRows, sums_of_rows: this.sumsOfRows, rows: bundle.rsm.atlas[0], vpl_count };
     const values = { ...this.weightValues(parameters), ...sums, point_table: this.pointTable };
     fill(target, this.programs.virtual_point_lights, values);
   }
 
-  // Samples of the RSM, the first of which are VPLs; steps of Lloyd move those to the middle of the light nearest to them.
+  // Clustered disc lights: draw samples of the RSM, take the first ones as VPLs, and run Lloyd iterations on these.
   makeDiscs(parameters) {
     this.placeVpls(this.samples, parameters, bundle.clustered_discs.samples);
     const [sample_position_footprint, sample_normal_area, sample_flux] = this.samples.textures;
@@ -429,6 +445,7 @@ class Frame {
     return { vpl_position_footprint, vpl_normal_area, vpl_flux };
   }
 
+  // Sampling weights, their running sums along rows and over rows, and the moments of the flux.
   sumWeights(state, parameters) {
     const moment_origin = column(state.faces[0].light_to_world, 3);
     fill(this.weights, this.programs.vpl_weights, { ...this.weightValues(parameters), moment_origin });
@@ -444,6 +461,7 @@ class Frame {
     this.momentSums = { flux_position, flux_square };
   }
 
+  // An inclusive scan along an axis, ping-pong between two targets.
   runningSum(values, targets, length, axis) {
     for (let reach = 1, i = 0; reach < length; reach *= 2, i = 1 - i) {
       fill(targets[i], this.programs.running_sum, { values, reach: axis.map((one) => one * reach), first: [0, 0] });
@@ -452,6 +470,7 @@ class Frame {
     return values;
   }
 
+  // Draw the G-buffer and the direct light.
   drawCamera(camera) {
     clear(this.gbuffer);
     gl.viewport(0, 0, this.gbuffer.width, this.gbuffer.height);
@@ -463,7 +482,7 @@ class Frame {
     fill(this.direct, this.programs.direct_light, { ...this.cameraValues(camera), ...this.rsmValues });
   }
 
-  // Add the VPLs from `first` to `end` to the image.
+  // Add the light of the VPLs from `first` up to, but not including, `end` to the indirect irradiance.
   gather(camera, parameters, first, end) {
     const [target, earlier] = this.indirect;
     const extinction_coefficient = bundle.config.visibility === "none" ? 0 : parameters.extinction_coefficient;
@@ -476,6 +495,7 @@ class Frame {
     this.indirect.reverse();
   }
 
+  // From irradiance to radiance; `indirect_share` scales the indirect light.
   resolve(indirect_share) {
     fill(this.radiance, this.programs.material_resolve, {
       gbuffer_albedo: this.gbuffer.textures[1], direct_irradiance: this.direct.textures[0],
@@ -483,7 +503,8 @@ class Frame {
     });
   }
 
-  // Exposure that brings the mean luminance of what is seen to the key: read back, so not every frame.
+  // The exposure for which the mean luminance of covered pixels is the key (Rec. 709 weights). It reads pixels back,
+  // so it is not measured in every frame.
   measuredExposure() {
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.radiance.framebuffer);
     const pixels = new Float32Array(4 * canvas.width * canvas.height);
@@ -496,6 +517,7 @@ class Frame {
     return luminance > 0 ? (bundle.view.exposure_key * covered) / luminance : 1;
   }
 
+  // Tone-map the radiance onto the canvas.
   show(exposure) {
     fill(null, this.programs.tone_mapping, { radiance: this.radiance.textures[0], exposure });
   }

@@ -24,6 +24,7 @@ VPL_COLUMNS = 64
 DATA_COLUMNS = 2048
 """Texels in a row of the textures that hold trees, triangles and visibility maps; any WebGL 2 has so many."""
 _TREE_DEPTH = 60
+"""Levels of the page's tree of boxes, which is the size of a ray's stack. A choice."""
 
 NOTE = "One bounce of indirect light from virtual point lights, drawn live in this page"
 

@@ -20,7 +20,9 @@ from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.scene.dynamic_lights import MIN_DISTANCE
 
 AZIMUTHS = 12
+"""Vertices round the axis of a cone's proxy. A choice."""
 RINGS = 2
+"""Rings of them from the axis to the rim. A choice."""
 CONE_DEFINES = {
     "AZIMUTH_COSINE": math.cos(math.pi / AZIMUTHS),
     # A facet between rings spans at most 90°/RINGS by 360°/AZIMUTHS of the unit sphere: half its diagonal is

@@ -20,9 +20,10 @@ from vpltune.renderer.gpu.render_targets import GBUFFER_READS
 from vpltune.renderer.gpu.resources import Resources
 
 _GROUP_SIZE = 64
+"""Invocations of a workgroup. A choice."""
 _GROUPS = RECEIVERS // _GROUP_SIZE
 _SUMS_BYTES = 9 * 4
-"""Of one workgroup: `ReceiverSums` in shaders/common/scene_statistics.glsl."""
+"""Bytes of a workgroup's `ReceiverSums` in shaders/common/scene_statistics.glsl."""
 
 STATISTICS_DEFINES = {
     "STATISTIC_COUNT": len(STATISTIC_NAMES),

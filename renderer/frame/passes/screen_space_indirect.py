@@ -15,7 +15,7 @@ from vpltune.renderer.gpu.resources import Resources
 BLOCK = 4
 """Pixels along the side of a block that shares the samples out; its image is for the interleaved filter."""
 SAMPLES = 16
-"""Of each pixel: 256 within a block."""
+"""Samples of each pixel: 256 in a block. A choice."""
 NEAREST_PIXEL = 0.7
 """Where sampling starts, in pixels: nearer, a pixel would mostly find itself, which gives it nothing."""
 

@@ -13,13 +13,17 @@ from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.scene.dynamic_lights import MIN_DISTANCE
 
 TILE_SIZE = 16
+"""Pixels along the side of a tile. A choice, as are the next three."""
 CELL_TILES = 4
+"""Tiles along the side of a cell."""
 GROUP_SIZE = 256
+"""Invocations of a workgroup that culls lights."""
 CULL_BATCH = 2048
 """Lights that one workgroup tests against one cell."""
 TILE_BATCH = 8192
 """Lights whose bits one tile holds in shared memory at a time: 1 KiB."""
 _TILE_BYTES = 16
+"""Bytes of a `LightTile` in shaders/common/light_culling.glsl."""
 
 
 class TiledLightsPass:

@@ -10,6 +10,7 @@ EXPOSURE_KEY = 0.25
 """Mean luminance of the image before the tone curve. A choice: a room's walls then look neither grey nor
 burnt out."""
 _EXPOSURE_BYTES = 16
+"""Bytes of a float, rounded up as storage blocks are."""
 
 
 class ToneMappingPass:

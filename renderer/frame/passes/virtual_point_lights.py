@@ -14,6 +14,7 @@ VPL_BYTES = 48
 FRAME_STATISTICS_BYTES = 16
 """Bytes of `shaders/common/scene_length.glsl`."""
 _ROW_MOMENTS_BYTES = 32
+"""Bytes of a row in shaders/virtual_point_lights/vpl_row_density.comp."""
 _DENSITY_READS = (*RSM_READS, "artist_parameters", "vpl_importance")
 _PLACEMENT_READS = (*_DENSITY_READS, "row_cdf", "marginal_cdf", "frame_statistics")
 

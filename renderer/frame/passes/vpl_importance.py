@@ -8,19 +8,20 @@ from vpltune.renderer.gpu.render_targets import GBUFFER_READS, RSM_READS, Reflec
 from vpltune.renderer.gpu.resources import Resources
 
 CELLS = 64
-"""Along the side of an RSM face, each with one importance."""
+"""Cells along the side of an RSM face, each with one importance. A choice."""
 CELLS_OF_MANY = 32
-"""The same where there are more than `FEW_FACES`: a point light has six."""
+"""The same with more than `FEW_FACES`. A choice."""
 RECEIVERS = 128
-"""Surface points that stand for the image."""
+"""Surface points that stand for the image. A choice."""
 SPREAD = 16.0
-"""Times a cell's area over which its light is spread: about a VPL's own, where there are a few hundred. At a
+"""Area over which a cell's light is spread, in areas of a cell: about that of one of a few hundred VPLs. At a
 quarter and at four times it, the error of 32 VPLs was the same within its noise."""
 DARK_SHARE = 0.01
-"""Of the squared mean irradiance, as relMSE has it: a black point is not infinitely important."""
+"""Share of the squared mean irradiance that is added to a receiver's own, as in relMSE: a black point is not
+infinitely important."""
 LEAST_IMPORTANCE = 0.05
-"""Of the mean over the lit cells, added to each: light that matters little, or is taken to, is drawn seldom
-and not never, so that sums stay right in the mean and no VPL grows too bright."""
+"""Share of the mean importance of lit cells that is added to each. Light that seems to matter little is drawn
+seldom, but never not at all, so that the mean stays right and no VPL grows too bright."""
 DEFINES = {
     "IMPORTANCE_RECEIVERS": RECEIVERS,
     "IMPORTANCE_SPREAD": SPREAD,
@@ -30,20 +31,20 @@ DEFINES = {
     "R2_STEP_Y": R2_STEPS[1],
 }
 
-_CELL_BYTES = 32
-_RECEIVER_BYTES = 32
+_CELL_BYTES, _RECEIVER_BYTES = 32, 32
+"""Bytes of the structures in shaders/common/vpl_importance_form.glsl."""
 
 
 def importance_cells(face_count: int) -> int:
-    """Cells along the side of each RSM face, where there are so many."""
+    """Cells along the side of each of `face_count` RSM faces."""
     return CELLS if face_count <= FEW_FACES else CELLS_OF_MANY
 
 
 class VplImportancePass(FramePass):
     """G-buffer, RSM → a factor of the sampling weight for every cell of the RSM.
 
-    Placing VPLs by what the camera sees is Segovia et al. 2006 ("Bidirectional instant radiosity"); here the
-    chances are those of least variance, from points spread over the image and without visibility.
+    Placing VPLs by what the camera sees is Segovia et al. 2006 ("Bidirectional instant radiosity"); here
+    the density is that of least variance, from points spread over the image, without visibility.
     """
 
     name = "vpl_importance"

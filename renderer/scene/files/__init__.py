@@ -1,4 +1,4 @@
-"""Scene files read whole and right, or refused in one line."""
+"""Readers for scene files: glTF, OBJ and PLY. Unsupported input is rejected with one line."""
 
 from vpltune.renderer.scene.files.scene_reader import read_scene
 

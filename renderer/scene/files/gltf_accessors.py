@@ -1,4 +1,4 @@
-"""glTF accessors: typed arrays in buffers, strided, normalised or sparse, with every bound checked first."""
+"""glTF accessors: strided, normalised or sparse arrays in buffers. All bounds are checked before access."""
 
 import math
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ from vpltune.renderer.scene.files.gltf_document import GltfDocument
 from vpltune.renderer.scene.files.json_object import JsonObject, shown
 from vpltune.renderer.scene.files.limits import MAX_DECODED_BYTES
 
+# glTF 2.0 section 3.6.2.2: component types, which are OpenGL enums, and component counts.
 _COMPONENT_DTYPES = {
     5120: np.dtype("i1"),
     5121: np.dtype("u1"),
@@ -25,20 +26,22 @@ _COMPONENT_COUNTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 @dataclass(frozen=True)
 class Elements:
-    """The elements of an accessor as stored: usually a view into the buffer, not a copy."""
+    """The elements of an accessor as stored. Usually a view into the buffer, not a copy."""
 
     stored: Num[np.ndarray, "count components"]
     normalized: bool
+    """Whether integers stand for fractions in [0, 1] or [−1, 1]."""
     where: str
+    """The accessor's place in the document, for messages."""
 
     def __len__(self) -> int:
         return len(self.stored)
 
     def as_floats(self, rows: Int64[np.ndarray, " n"] | None = None) -> Float32[np.ndarray, "n components"]:
-        """The elements, or those of `rows`, as floats; normalised integers by glTF 2.0 section 3.11.
+        """The elements with the indices `rows`, or all, as floats (glTF 2.0 section 3.11).
 
         Raises:
-            SceneFileError: one is NaN or infinite.
+            SceneFileError: an element is NaN or infinite.
         """
         chosen = self.stored if rows is None else self.stored[rows]
         values = chosen.astype(np.float32)
@@ -61,10 +64,10 @@ class GltfAccessors:
         self.buffers = GltfBuffers(document)
 
     def referred(self, holder: JsonObject, key: str, types: tuple[str, ...]) -> Elements:
-        """The accessor whose index is `holder`'s `key`; its type must be one of `types`.
+        """The elements of the accessor to which `key` of `holder` refers. Its type must be one of `types`.
 
         Raises:
-            SceneFileError: index, type, component type or extent is wrong, or a buffer behind it is.
+            SceneFileError: the index, type, component type, extent or buffer of the accessor is invalid.
         """
         accessors = self._document.list_of("accessors")
         accessor = accessors[holder.required_index(key, len(accessors), "accessors")]
@@ -79,7 +82,7 @@ class GltfAccessors:
         if "bufferView" in accessor.members:
             stored = self._strided(accessor, dtype, shape)
         else:
-            # A kilobyte of JSON can ask for any number of zeros.
+            # The elements are zero, and a kilobyte of JSON can ask for any number of them.
             self._document.decoded.spend(math.prod(shape) * dtype.itemsize, accessor.where)
             stored = np.zeros(shape, dtype)
         if sparse is not None:
@@ -87,13 +90,21 @@ class GltfAccessors:
         return Elements(stored, accessor.boolean("normalized", False), accessor.where)
 
     def count(self, holder: JsonObject, key: str) -> int:
-        """The element count that the accessor of `holder`'s `key` announces, without its elements."""
+        """The element count of the accessor to which `key` of `holder` refers. Its elements are not read.
+
+        Raises:
+            SceneFileError: the index or the count is out of range.
+        """
         accessors = self._document.list_of("accessors")
         accessor = accessors[holder.required_index(key, len(accessors), "accessors")]
         return accessor.integer("count", low=1, high=MAX_DECODED_BYTES)
 
     def normalized(self, holder: JsonObject, key: str) -> bool:
-        """Whether the accessor of `holder`'s `key` says that its integers are normalised."""
+        """Whether the accessor to which `key` of `holder` refers has normalised integers.
+
+        Raises:
+            SceneFileError: the index is out of range.
+        """
         accessors = self._document.list_of("accessors")
         return accessors[holder.required_index(key, len(accessors), "accessors")].boolean("normalized", False)
 
@@ -112,7 +123,8 @@ class GltfAccessors:
         end = offset + stride * (shape[0] - 1) + element_size
         if end > len(content):
             raise SceneFileError(
-                f"{holder.where}: its {shape[0]} elements end at byte {end} of a bufferView of {len(content)}"
+                f"{holder.where}: its {shape[0]} elements end at byte {end}, beyond the bufferView's "
+                f"{len(content)} bytes"
             )
         return np.ndarray(shape, dtype, content, offset, (stride, dtype.itemsize))
 

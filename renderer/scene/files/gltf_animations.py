@@ -1,6 +1,6 @@
-"""glTF animations: channels checked one by one, and the part of the node hierarchy that they move.
+"""glTF animations: their channels, and the part of the node hierarchy that they move.
 
-A broken channel is left out with a warning: the scene at rest is right without it.
+A broken channel is left out with a warning, because the scene at rest does not need it.
 """
 
 from collections.abc import Sequence
@@ -18,6 +18,7 @@ from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, MAX_CHANNELS
 from vpltune.renderer.scene.scene import trs_matrices
 from vpltune.renderer.scene.scene_animation import Animation, Channel, Interpolation, Skin
 
+# Animated properties and the accessor type of their values, then interpolations (glTF 2.0 section 3.11).
 _PROPERTIES = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
 _INTERPOLATIONS: dict[str, Interpolation] = {
     "STEP": "step",
@@ -28,23 +29,28 @@ _INTERPOLATIONS: dict[str, Interpolation] = {
 
 @dataclass
 class Placed:
-    """Which nodes and skins the scene's instances, lights and cameras hang on, in the scene's order."""
+    """The nodes and skins of the scene's instances, lights and cameras, in the scene's order.
+
+    Nodes are indices into the document's nodes.
+    """
 
     instance_nodes: list[int] = field(default_factory=list)
-    """−1 where a skin places the instance."""
+    """The node of each instance; −1 if a skin places it."""
     instance_local: list[Float64[np.ndarray, "4 4"]] = field(default_factory=list)
+    """Transform from each instance to its node."""
     instance_skins: list[int] = field(default_factory=list)
+    """Index into `skins` for each instance; −1 if no animated skin deforms it."""
     light_nodes: list[int] = field(default_factory=list)
     camera_nodes: list[int] = field(default_factory=list)
     skins: list[tuple[list[int], Float64[np.ndarray, "joints 4 4"]]] = field(default_factory=list)
-    """Joints, as nodes, with their inverse bind matrices."""
+    """The joints' nodes and their inverse bind matrices."""
 
 
 def read_channels(document: GltfDocument, nodes: GltfNodes, accessors: GltfAccessors) -> list[Channel]:
-    """The playable channels of all animations; `Channel.node` is an index into the document's nodes.
+    """The valid channels of all animations. `Channel.node` is an index into the document's nodes.
 
-    All animations play at once, each over and over in its own time; where two move the same property of
-    a node, the first does.
+    All animations play at once, and each loops with its own period. If two channels animate the same property
+    of a node, the first one wins.
     """
     try:
         clips = [(clip, clip.objects("channels")) for clip in document.list_of("animations")]
@@ -54,7 +60,7 @@ def read_channels(document: GltfDocument, nodes: GltfNodes, accessors: GltfAcces
     total = sum(len(channels) for _, channels in clips)
     if total > MAX_CHANNELS:
         document.warnings.add(
-            f"animations are left out: {total:,} channels, and at most {MAX_CHANNELS:,} fit"
+            f"animations are left out: they must have at most {MAX_CHANNELS:,} channels, got {total:,}"
         )
         return []
     taken: dict[tuple[int, str], Channel] = {}
@@ -76,13 +82,14 @@ def read_channels(document: GltfDocument, nodes: GltfNodes, accessors: GltfAcces
         document.warnings.add(f"{len(faults)} of {total} animation channels are left out: {faults[0]}")
     if repeated:
         document.warnings.add(
-            f"{repeated} of {total} animation channels move what an earlier one moves, and are left out"
+            f"{repeated} of {total} animation channels are left out: an earlier one animates the same "
+            "property"
         )
     return list(taken.values())
 
 
 def moving_nodes(channels: Sequence[Channel], nodes: GltfNodes) -> set[int]:
-    """The nodes with a channel, and all below them."""
+    """The nodes with a channel and all their descendants."""
     moving = {channel.node for channel in channels}
     pending = list(moving)
     while pending:
@@ -93,7 +100,7 @@ def moving_nodes(channels: Sequence[Channel], nodes: GltfNodes) -> set[int]:
 
 
 def placed_animation(channels: Sequence[Channel], placed: Placed, nodes: GltfNodes) -> Animation | None:
-    """The animation of what is placed; None where nothing of it moves."""
+    """The animation of the placed instances, lights and cameras; None if none of them moves."""
     leaves = [*placed.instance_nodes, *placed.light_nodes, *placed.camera_nodes]
     leaves += [joint for joints, _ in placed.skins for joint in joints]
     order = _with_ancestors([leaf for leaf in leaves if leaf >= 0], nodes.parents)
@@ -122,7 +129,7 @@ def placed_animation(channels: Sequence[Channel], placed: Placed, nodes: GltfNod
 def _channel(
     clip: JsonObject, member: JsonObject, document: GltfDocument, nodes: GltfNodes, accessors: GltfAccessors
 ) -> list[Channel]:
-    """The channel, its duration still unset; none where it moves nothing that is drawn here."""
+    """The channel, with its duration still unset, or nothing if what it animates is not supported."""
     target = member.required_object("target")
     animated = target.string("path")
     if animated in ("weights", "pointer"):
@@ -132,10 +139,12 @@ def _channel(
         )
         return []
     if animated not in _PROPERTIES:
-        raise SceneFileError(f"{target.at('path')}: must be {', '.join(_PROPERTIES)}, got {animated!r:.40}")
+        raise SceneFileError(
+            f"{target.at('path')}: must be one of {', '.join(_PROPERTIES)}, got {animated!r:.40}"
+        )
     node = target.index("node", len(nodes.nodes), "nodes")
     if node is None:
-        return []  # glTF 2.0 section 3.11: a channel without a node is for extensions
+        return []  # glTF 2.0 section 3.11: a channel without a node is meant for extensions
     if "matrix" in nodes.nodes[node].members:
         raise SceneFileError(f"{target.where}: an animated node must not have a matrix")
     samplers = clip.objects("samplers")
@@ -143,7 +152,7 @@ def _channel(
     name = sampler.string("interpolation", "LINEAR")
     if name not in _INTERPOLATIONS:
         raise SceneFileError(
-            f"{sampler.at('interpolation')}: must be {', '.join(_INTERPOLATIONS)}, got {name!r:.40}"
+            f"{sampler.at('interpolation')}: must be one of {', '.join(_INTERPOLATIONS)}, got {name!r:.40}"
         )
     times = _times(accessors.referred(sampler, "input", ("SCALAR",)), document)
     output = accessors.referred(sampler, "output", (_PROPERTIES[animated],))
@@ -165,7 +174,7 @@ def _values(
     per_key = 3 if interpolation == "cubic_spline" else 1
     if len(elements) != per_key * key_count:
         raise SceneFileError(
-            f"{elements.where}: must have {per_key} elements for each of {key_count} times, "
+            f"{elements.where}: must have {per_key * key_count} elements for {key_count} times, "
             f"got {len(elements)}"
         )
     if elements.stored.dtype.kind != "f" and not elements.normalized:
@@ -185,7 +194,7 @@ def _values(
 
 
 def _with_ancestors(leaves: Sequence[int], parents: Sequence[int]) -> list[int]:
-    """The nodes and all above them, parents before children."""
+    """The nodes and all their ancestors, parents before children."""
     order: dict[int, None] = {}
     for leaf in leaves:
         chain = []
@@ -201,7 +210,7 @@ def _rows(nodes: Sequence[int], row_of: dict[int, int]) -> Int32[np.ndarray, " n
 
 
 def _rest(node: JsonObject) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """A node's local matrix, translation, rotation and scale at rest, all checked by now."""
+    """A node's local matrix, translation, rotation and scale at rest. They have been checked before."""
     translation = node.numbers("translation", 3, default=(0.0, 0.0, 0.0))
     rotation = node.numbers("rotation", 4, default=(0.0, 0.0, 0.0, 1.0))
     scale = node.numbers("scale", 3, default=(1.0, 1.0, 1.0))

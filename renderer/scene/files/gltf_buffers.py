@@ -1,4 +1,4 @@
-"""glTF buffers, buffer views and URIs: where the bytes of accessors and images come from."""
+"""glTF buffers, buffer views and URIs: the bytes of accessors and images."""
 
 import base64
 import binascii
@@ -10,11 +10,12 @@ from vpltune.renderer.scene.files.gltf_document import GltfDocument
 from vpltune.renderer.scene.files.gltf_meshopt import decompressed_view
 from vpltune.renderer.scene.files.json_object import JsonObject
 
+# The scheme of a URI (RFC 3986 section 3.1).
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
 
 
 class GltfBuffers:
-    """The buffers of one document, each read once, when first asked for."""
+    """The buffers of one document. Each is read once, when it is first needed."""
 
     def __init__(self, document: GltfDocument) -> None:
         self._document = document
@@ -22,14 +23,14 @@ class GltfBuffers:
         self._decompressed_views: dict[str, memoryview] = {}
 
     def view(self, holder: JsonObject, key: str = "bufferView") -> tuple[memoryview, int | None]:
-        """The bytes of the buffer view that `holder` refers to by `key`, and its byteStride if it has one.
+        """The bytes of the buffer view to which `key` of `holder` refers, and its byteStride or None.
 
         Raises:
-            SceneFileError: the reference, the view or its buffer is broken or missing.
+            SceneFileError: the reference, the view or its buffer is invalid or missing.
         """
         views = self._document.list_of("bufferViews")
         view = views[holder.required_index(key, len(views), "bufferViews")]
-        # Strides above 252 or off a multiple of four break a rule of the format, but are clear.
+        # The format allows multiples of 4 up to 252 only, but other strides are unambiguous.
         stride = view.integer("byteStride", low=1, high=2**31) if "byteStride" in view.members else None
         compression = view.extension("EXT_meshopt_compression")
         if compression is not None and self._is_placeholder(view):
@@ -37,7 +38,7 @@ class GltfBuffers:
         return self._slice(view), stride
 
     def _is_placeholder(self, view: JsonObject) -> bool:
-        """Whether the buffer only stands in for what is to be decompressed: it has no bytes of its own."""
+        """Whether the view's buffer has no bytes of its own, so that the view must be decompressed."""
         buffers = self._document.list_of("buffers")
         index = view.required_index("buffer", len(buffers), "buffers")
         in_file = index == 0 and self._document.binary_chunk is not None
@@ -56,7 +57,8 @@ class GltfBuffers:
         buffer = self._buffer(view)
         if start + length > len(buffer):
             raise SceneFileError(
-                f"{view.where}: bytes {start} to {start + length} lie outside its buffer of {len(buffer)}"
+                f"{view.where}: must lie within its buffer of {len(buffer)} bytes, got {start} to "
+                f"{start + length}"
             )
         return buffer[start : start + length]
 
@@ -81,10 +83,11 @@ class GltfBuffers:
 
 
 def read_uri(document: GltfDocument, holder: JsonObject) -> bytes:
-    """What the `uri` of a buffer or image stands for: a data URI, or a file in the scene's folder.
+    """The bytes of a `uri` of a buffer or image: a data URI, or a file in the scene's folder.
 
     Raises:
-        SceneFileError: another scheme, a path out of the folder, a file that cannot be read, broken base64.
+        SceneFileError: the URI has another scheme, leads out of the folder or has broken base64, or the file
+            cannot be read.
     """
     uri = holder.string("uri")
     where = holder.at("uri")
@@ -93,7 +96,7 @@ def read_uri(document: GltfDocument, holder: JsonObject) -> bytes:
     if _SCHEME.match(uri):
         raise SceneFileError(f"{where}: must be a data: URI or a file in the scene's folder, got {uri!r:.80}")
     path = urllib.parse.unquote(uri)
-    # Some exporters leave a literal % as it is.
+    # Some exporters do not encode a literal %.
     if path != uri and not document.folder.has(path, where) and document.folder.has(uri, where):
         path = uri
     return document.folder.read(path, where)

@@ -1,4 +1,4 @@
-"""glTF morph targets and skins, applied once: the mesh as it stands at rest."""
+"""glTF morph targets and skins, applied once to get the mesh at rest."""
 
 from dataclasses import dataclass
 
@@ -15,14 +15,14 @@ from vpltune.renderer.scene.files.surface import unit_rows
 
 @dataclass(frozen=True, eq=False)
 class Deformation:
-    """What bends the mesh of a node."""
+    """The deformation of the mesh of a node."""
 
     weights: tuple[float, ...] = ()
-    """Of the morph targets."""
+    """Weights of the morph targets."""
     joint_to_world: Float64[np.ndarray, "joints 4 4"] | None = None
-    """Each joint's world matrix times its inverse bind matrix; None without a skin."""
+    """World matrix times inverse bind matrix of each joint; None without a skin."""
     is_animated: bool = False
-    """Whether the joints move, so that the mesh must keep what it was before they bent it."""
+    """Whether the joints move, so that the mesh must keep its bind pose."""
 
 
 def read_deformation(
@@ -33,10 +33,18 @@ def read_deformation(
     accessors: GltfAccessors,
     moving_nodes: set[int],
 ) -> Deformation:
-    """The morph weights of a node (its own, else its mesh's) and the pose of its skin at rest.
+    """The morph weights of a node (its own, or else its mesh's) and the rest pose of its skin.
+
+    Args:
+        node: the node that shows the mesh.
+        mesh: the mesh.
+        document: the document of both.
+        nodes: gives the joints' transforms to world.
+        accessors: reads the inverse bind matrices.
+        moving_nodes: indices of the animated nodes.
 
     Raises:
-        SceneFileError: a reference is out of range, or counts disagree.
+        SceneFileError: a reference is out of range, or counts do not match.
     """
     holder = node if "weights" in node.members else mesh
     count = len(holder.members["weights"]) if isinstance(holder.members.get("weights"), list) else 0
@@ -52,10 +60,10 @@ def read_deformation(
 def read_skin(
     skin: JsonObject, nodes: GltfNodes, accessors: GltfAccessors
 ) -> tuple[list[int], Float64[np.ndarray, "joints 4 4"]]:
-    """The nodes that are a skin's joints, and their inverse bind matrices.
+    """The nodes of a skin's joints, and their inverse bind matrices.
 
     Raises:
-        SceneFileError: no joint, one out of range, or fewer matrices than joints.
+        SceneFileError: there are no joints, one is out of range, or there are fewer matrices than joints.
     """
     joints = skin.indices("joints", len(nodes.nodes), "nodes")
     if not joints:
@@ -83,13 +91,23 @@ def morphed(
 ) -> Float32[np.ndarray, "n 3"]:
     """`base` plus the weighted displacements of the primitive's morph targets.
 
+    Args:
+        base: positions or normals of the used vertices.
+        semantic: "POSITION" or "NORMAL".
+        primitive: has the targets.
+        weights: one for each target.
+        accessors: reads the displacements.
+        used: indices of the used vertices.
+        vertex_count: number of vertices, used or not, that each target must have.
+
     Raises:
-        SceneFileError: more weights than targets, or a target of another vertex count.
+        SceneFileError: there are more weights than targets, or a target has another vertex count.
     """
     targets = primitive.objects("targets")
     if len(weights) > len(targets) and any(weights[len(targets) :]):
         raise SceneFileError(
-            f"{primitive.where}: has {len(targets)} morph targets, and there are {len(weights)} weights"
+            f"{primitive.where}: must have a morph target for each of {len(weights)} weights, "
+            f"got {len(targets)}"
         )
     total = base.astype(np.float64)
     for target, weight in zip(targets, weights, strict=False):
@@ -107,10 +125,15 @@ def morphed(
 def read_influences(
     attributes: dict[str, Elements], used: Int64[np.ndarray, " n"], joint_count: int
 ) -> tuple[Int32[np.ndarray, "n influences"], Float64[np.ndarray, "n influences"]]:
-    """The joints that each vertex follows, and how much: rows of weights sum to 1.
+    """The joints of each vertex, and their weights, which sum to 1.
+
+    Args:
+        attributes: the primitive's, with JOINTS_0 and perhaps further sets.
+        used: indices of the used vertices.
+        joint_count: number of joints of the skin.
 
     Raises:
-        SceneFileError: a joint out of range, a negative weight, or a vertex without any.
+        SceneFileError: a joint is out of range, a weight is negative, or a vertex has no weight above zero.
     """
     joints: list[np.ndarray] = []
     weights: list[np.ndarray] = []
@@ -129,7 +152,7 @@ def read_influences(
     total = all_weights.sum(axis=1, keepdims=True)
     if not (total > 0.0).all():
         raise SceneFileError(f"{attributes['JOINTS_0'].where}: every vertex must have a weight above zero")
-    # A weight of zero may name any joint; weights stored in bytes do not quite sum to one.
+    # The joint of a zero weight may be out of range. Weights stored as bytes do not sum to exactly 1.
     chosen = np.minimum(np.concatenate(joints, axis=1), joint_count - 1).astype(np.int32)
     return chosen, all_weights / total
 
@@ -141,14 +164,24 @@ def skinned(
     weights: Float64[np.ndarray, "n influences"],
     joint_to_world: Float64[np.ndarray, "joints 4 4"],
 ) -> tuple[Float32[np.ndarray, "n 3"], Float32[np.ndarray, "n 3"] | None]:
-    """Linear blend skinning into world space: each vertex under the weighted sum of its joints' matrices."""
+    """Positions and normals in world space by linear blend skinning.
+
+    The weighted sum of its joints' matrices transforms each vertex, and the cofactors of the sum its normal.
+
+    Args:
+        positions: in the bind pose.
+        normals: unit normals in the bind pose, or None.
+        joints: indices into `joint_to_world`.
+        weights: each row sums to 1.
+        joint_to_world: world matrix times inverse bind matrix of each joint.
+    """
     blended = np.zeros((len(positions), 3, 4))
     for k in range(joints.shape[1]):
         blended += weights[:, k, None, None] * joint_to_world[joints[:, k], :3]
     placed = np.einsum("nij,nj->ni", blended[:, :, :3], positions.astype(np.float64)) + blended[:, :, 3]
     if normals is None:
         return placed.astype(np.float32), None
-    # Normals go by the cofactors, as in `renderer.scene.scene.transform_normals`.
+    # As in `renderer.scene.scene.transform_normals`.
     rows = blended[:, 0, :3], blended[:, 1, :3], blended[:, 2, :3]
     cofactors = np.stack(
         [np.cross(rows[1], rows[2]), np.cross(rows[2], rows[0]), np.cross(rows[0], rows[1])], axis=1

@@ -1,4 +1,4 @@
-"""The glTF 2.0 container: .gltf and .glb taken apart, version and extensions checked."""
+"""The glTF 2.0 container: .gltf and .glb files, with their version and extensions checked."""
 
 import struct
 from dataclasses import dataclass, field
@@ -10,9 +10,10 @@ from vpltune.renderer.scene.files.limits import DecodedBytes
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
 
 _GLB_MAGIC = b"glTF"
-_JSON_CHUNK = 0x4E4F534A
-_BINARY_CHUNK = 0x004E4942
+# Chunk types "JSON" and "BIN": glTF 2.0, section 4.4.3.
+_JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 
+# Extensions that the readers support.
 READ_EXTENSIONS = frozenset(
     {
         "EXT_mesh_gpu_instancing",
@@ -29,7 +30,7 @@ READ_EXTENSIONS = frozenset(
     }
 )
 
-# Gloss, thin layers, metadata and motion: a still, diffuse image is the same without them.
+# Extensions for gloss, layers, metadata and motion, which do not change a still image of diffuse surfaces.
 IRRELEVANT_EXTENSIONS = frozenset(
     {
         "KHR_animation_pointer",
@@ -51,28 +52,28 @@ IRRELEVANT_EXTENSIONS = frozenset(
 
 @dataclass(frozen=True)
 class GltfDocument:
-    """A parsed glTF file and what is kept while it is read."""
+    """A parsed glTF file, and the state kept while it is read."""
 
     root: JsonObject
     folder: SceneFolder
     binary_chunk: memoryview | None
-    """The BIN chunk of a .glb."""
+    """The BIN chunk of a .glb, or None."""
     warnings: Warnings
     decoded: DecodedBytes = field(default_factory=DecodedBytes)
     _lists: dict[str, list[JsonObject]] = field(default_factory=dict)
 
     def list_of(self, kind: str) -> list[JsonObject]:
-        """A top-level list such as "nodes", empty where the file has none.
+        """A top-level list such as "nodes"; empty if the file has none.
 
         Raises:
-            SceneFileError: it is no list of objects.
+            SceneFileError: the value is not a list of objects.
         """
         if kind not in self._lists:
             self._lists[kind] = self.root.objects(kind)
         return self._lists[kind]
 
     def referred(self, holder: JsonObject, key: str, kind: str) -> JsonObject | None:
-        """The member of list `kind` whose index is `holder`'s `key`; None where the key is absent.
+        """The member of the list `kind` to which `key` of `holder` refers; None if the key is absent.
 
         Raises:
             SceneFileError: the index is out of range.
@@ -82,20 +83,21 @@ class GltfDocument:
 
     @property
     def required_extensions(self) -> list[str]:
+        """The names in `extensionsRequired`."""
         return self.root.strings("extensionsRequired")
 
 
 def open_gltf(path: Path, warnings: Warnings) -> GltfDocument:
-    """Read and take apart a .gltf or .glb file; buffers and images are not opened yet.
+    """Read and parse a .gltf or .glb file. Buffers and images are read later.
 
     Raises:
-        SceneFileError: the file cannot be read, is no glTF 2.0, or requires an extension not read here.
+        SceneFileError: the file cannot be read, is not glTF 2.0, or requires an unsupported extension.
     """
     folder = SceneFolder(path)
     content = folder.read_scene_file(path)
     if not content:
         raise SceneFileError("is empty")
-    # By content, not by name: a .glb saved as .gltf is common, and both say what they are.
+    # Decide by content, because a .glb named .gltf is common.
     is_binary = content.startswith(_GLB_MAGIC) or path.suffix.lower() == ".glb"
     json_chunk, binary_chunk = _glb_chunks(content) if is_binary else (content, None)
     document = GltfDocument(parse_json(json_chunk), folder, binary_chunk, warnings)
@@ -117,7 +119,7 @@ def _glb_chunks(content: bytes) -> tuple[bytes, memoryview | None]:
     kind, json_chunk, end = _glb_chunk(content, 12, length)
     if kind != _JSON_CHUNK:
         raise SceneFileError(f"GLB: the first chunk must be JSON, got type {kind:#x}")
-    # Only the second chunk can be the binary buffer; chunks of other types are to be passed over.
+    # Only the second chunk can be the binary buffer. Chunks of other types must be ignored.
     if end + 8 <= length:
         kind, binary_chunk, _ = _glb_chunk(content, end, length)
         if kind == _BINARY_CHUNK:
@@ -137,7 +139,7 @@ def _glb_chunk(content: bytes, start: int, file_length: int) -> tuple[int, memor
 
 def _check_version(root: JsonObject) -> None:
     asset = root.required_object("asset")
-    # minVersion is what a reader must know; version alone may be a later 2.x, which 2.0 readers can read.
+    # minVersion is what a reader must support. Without it, 2.0 readers can read any later 2.x.
     version = asset.string("minVersion", asset.string("version"))
     major, _, minor = version.partition(".")
     if major != "2" or ("minVersion" in asset.members and minor != "0"):

@@ -1,4 +1,4 @@
-"""KHR_draco_mesh_compression: geometry of one primitive in a Draco bitstream."""
+"""KHR_draco_mesh_compression: the geometry of a primitive in a Draco bitstream."""
 
 import DracoPy
 import numpy as np
@@ -13,15 +13,21 @@ from vpltune.renderer.scene.files.limits import DecodedBytes
 def decode_draco(
     accessors: GltfAccessors, primitive: JsonObject, compression: JsonObject, decoded: DecodedBytes
 ) -> tuple[dict[str, Elements], Int64[np.ndarray, " corners"]]:
-    """The vertex attributes and the triangle corners of a compressed primitive.
+    """The vertex attributes by semantic, and the triangle corners, of a compressed primitive.
+
+    Args:
+        accessors: gives counts and the bitstream.
+        primitive: the primitive.
+        compression: its extension object.
+        decoded: the memory limit.
 
     Raises:
-        SceneFileError: the bitstream is broken, lacks an attribute, or disagrees with the accessors' counts.
+        SceneFileError: the bitstream is broken, lacks an attribute, or differs from the accessors' counts.
     """
     attributes = primitive.required_object("attributes")
     vertex_count = accessors.count(attributes, "POSITION")
     corner_count = accessors.count(primitive, "indices")
-    # 16 bytes: a bitstream can say any count; the accessors, once paid for, bound what is accepted.
+    # A bitstream can declare any count. Reserve 16 bytes each for the accessors' counts, which it must match.
     decoded.spend(16 * (vertex_count + corner_count), primitive.where)
     content, _ = accessors.buffers.view(compression)
     try:
@@ -31,7 +37,7 @@ def decode_draco(
     corners = np.asarray(getattr(mesh, "faces", ()), np.int64).ravel()
     if len(corners) != corner_count:
         raise SceneFileError(
-            f"{compression.where}: holds {len(corners)} indices, its accessor says {corner_count}"
+            f"{compression.where}: holds {len(corners)} indices, but its accessor says {corner_count}"
         )
     by_id = {stored["unique_id"]: stored["data"] for stored in mesh.attributes}
     elements: dict[str, Elements] = {}
@@ -45,7 +51,7 @@ def decode_draco(
         stored = by_id[unique_id].reshape(len(by_id[unique_id]), -1)
         if len(stored) != vertex_count:
             raise SceneFileError(
-                f"{ids.at(semantic)}: holds {len(stored)} vertices, its accessor says {vertex_count}"
+                f"{ids.at(semantic)}: holds {len(stored)} vertices, but its accessor says {vertex_count}"
             )
         elements[semantic] = Elements(stored, accessors.normalized(attributes, semantic), ids.at(semantic))
     return elements, corners

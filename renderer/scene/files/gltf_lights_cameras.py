@@ -1,4 +1,4 @@
-"""glTF cameras and KHR_lights_punctual lights, placed in the world."""
+"""glTF cameras and KHR_lights_punctual lights in world space."""
 
 import math
 
@@ -15,10 +15,15 @@ from vpltune.renderer.scene.scene import Camera, Light, without_scale
 def read_camera(
     camera: JsonObject, to_world: Float64[np.ndarray, "4 4"], document: GltfDocument
 ) -> Camera | None:
-    """The camera of a node; None for an orthographic one. The image's size decides the aspect ratio.
+    """The camera of a node; None if it is orthographic. The aspect ratio in the file is not used.
+
+    Args:
+        camera: the camera object.
+        to_world: the node's transform.
+        document: takes warnings.
 
     Raises:
-        SceneFileError: a value is missing or out of range, or the node's scale leaves no direction.
+        SceneFileError: a value is missing or out of range, or the node's scale leaves no view direction.
     """
     kind = camera.string("type")
     if kind == "orthographic":
@@ -37,17 +42,22 @@ def read_camera(
         raise SceneFileError(f"{perspective.at('yfov')}: must lie in (0, π) radians, got {yfov:g}")
     rigid = without_scale(to_world)
     if rigid is None:
-        raise SceneFileError(f"{camera.where}: its node is scaled to nothing, which leaves it no direction")
+        raise SceneFileError(f"{camera.where}: its node must not be scaled to zero: no direction is left")
     return Camera(rigid, yfov)
 
 
 def read_light(
     light: JsonObject, to_world: Float64[np.ndarray, "4 4"], document: GltfDocument
 ) -> Light | None:
-    """A punctual light at a node: it shines along the node's −Z; the node's scale changes no intensity.
+    """The punctual light of a node. It shines along the node's −Z; the scale does not affect intensity.
+
+    Args:
+        light: the light object.
+        to_world: the node's transform.
+        document: takes warnings.
 
     Returns:
-        None for a light of no intensity.
+        None if the intensity is zero.
 
     Raises:
         SceneFileError: a value is missing or out of range, or the node's scale leaves no direction.
@@ -64,7 +74,7 @@ def read_light(
     inner, outer = _cone(light) if kind == "spot" else (0.0, math.pi / 4)
     if kind != "directional" and "range" in light.members:
         light.number("range")
-        document.warnings.add("a light's range is ignored: light falls off as 1/d² without end")
+        document.warnings.add("a light's range is ignored: light falls off as 1/d² at any distance")
     intensity = strength * color
     if intensity.max() > LARGEST_RADIOMETRIC:
         raise SceneFileError(f"{light.where}: color times intensity must be at most {LARGEST_RADIOMETRIC:g}")
@@ -90,7 +100,7 @@ def _cone(light: JsonObject) -> tuple[float, float]:
     spot = light.object("spot") or JsonObject({}, light.at("spot"))
     inner = spot.number("innerConeAngle", 0.0)
     outer = spot.number("outerConeAngle", math.pi / 4)
-    # 1e-6: π/2 written by a float32 exporter.
+    # 1e-6 accepts π/2 in single precision.
     if not 0.0 <= inner < outer <= math.pi / 2 + 1e-6:
         raise SceneFileError(
             f"{spot.where}: cone angles must satisfy 0 ≤ innerConeAngle < outerConeAngle ≤ π/2, "
@@ -102,5 +112,5 @@ def _cone(light: JsonObject) -> tuple[float, float]:
 def _unit(vector: Float64[np.ndarray, "3"], where: str) -> Float64[np.ndarray, "3"]:
     length = np.linalg.norm(vector)
     if not length > 0.0:
-        raise SceneFileError(f"{where}: its node is scaled to nothing, which leaves it no direction")
+        raise SceneFileError(f"{where}: its node must not be scaled to zero: no direction is left")
     return vector / length

@@ -1,4 +1,4 @@
-"""glTF materials: base colour factors and textures; the rest is outside a diffuse model."""
+"""glTF materials: base-colour factors and textures. A diffuse material has no use for the rest."""
 
 import math
 from dataclasses import dataclass
@@ -14,23 +14,26 @@ from vpltune.renderer.scene.files.image_texels import GLTF_FORMATS, ImageDecoder
 from vpltune.renderer.scene.files.json_object import JsonObject, shown
 from vpltune.renderer.scene.scene import Material, Texture, Wrap
 
+# OpenGL enums of wrap modes, as a glTF sampler gives them.
 _WRAPS: dict[int, Wrap] = {33071: "clamp_to_edge", 33648: "mirrored_repeat", 10497: "repeat"}
+# And of nearest filters.
 _NEAREST_FILTERS = (9728, 9984, 9986)
 
 
 @dataclass(frozen=True, eq=False)
 class BaseColor:
-    """How a primitive takes its base colour."""
+    """The base colour of a primitive: its material, and how its texture is looked up."""
 
     material: int
     """Index into the scene's materials."""
     uv_set: int | None = None
-    """Which TEXCOORD the texture is looked up with; None without a texture."""
+    """The set of texture coordinates, n of TEXCOORD_n; None without a texture."""
     uv_transform: Float64[np.ndarray, "2 3"] | None = None
+    """The KHR_texture_transform, if any."""
 
 
 class GltfMaterials:
-    """The materials and textures that the scene's primitives use, each read once, when first used."""
+    """The materials and textures that the scene's primitives use. Each is read once, when first used."""
 
     def __init__(self, document: GltfDocument, accessors: GltfAccessors) -> None:
         self._document = document
@@ -43,10 +46,10 @@ class GltfMaterials:
         self._texels: dict[str, UInt8[np.ndarray, "height width 3"]] = {}
 
     def of(self, primitive: JsonObject) -> BaseColor:
-        """The base colour of a primitive; white where it names no material.
+        """The base colour of a primitive; white if the primitive has no material.
 
         Raises:
-            SceneFileError: the material, its texture or its image is broken, missing or out of range.
+            SceneFileError: the material, its texture or its image is invalid or missing.
         """
         material = self._document.referred(primitive, "material", "materials")
         if material is None:
@@ -58,10 +61,10 @@ class GltfMaterials:
     def _read(self, material: JsonObject) -> BaseColor:
         holder, factor_key, texture_key = self._base_color_keys(material)
         factor = holder.numbers(factor_key, 4, default=(1.0, 1.0, 1.0, 1.0))[:3]
-        # 1e-6: one written as 1.0000001 by a float32 exporter.
+        # 1e-6 accepts a 1 in single precision, such as 1.0000001.
         if (factor < 0.0).any() or (factor > 1.0 + 1e-6).any():
             raise SceneFileError(f"{holder.at(factor_key)}: must lie in [0, 1], got {shown(factor.tolist())}")
-        self._say_what_is_left_out(material)
+        self._warn_of_ignored(material)
         info = holder.object(texture_key)
         texture = None if info is None else self._texture(info)
         name = label(material.string("name", ""), f"material {len(self.materials)}")
@@ -88,7 +91,7 @@ class GltfMaterials:
         metallic = material.object("pbrMetallicRoughness")
         return metallic or JsonObject({}, material.where), "baseColorFactor", "baseColorTexture"
 
-    def _say_what_is_left_out(self, material: JsonObject) -> None:
+    def _warn_of_ignored(self, material: JsonObject) -> None:
         warnings = self._document.warnings
         emissive = material.numbers("emissiveFactor", 3, default=(0.0, 0.0, 0.0))
         strength = material.extension("KHR_materials_emissive_strength")
@@ -120,8 +123,8 @@ class GltfMaterials:
         image = self._image(texture)
         if image is None:
             self._document.warnings.tally(
-                "1 texture has no image in a format read here; white is used",
-                "{n} textures have no image in a format read here; white is used",
+                "1 texture has no image in a supported format; white is used",
+                "{n} textures have no image in a supported format; white is used",
             )
             return None
         wrap_u, wrap_v = self._wraps(texture)
@@ -168,10 +171,10 @@ class GltfMaterials:
 
 
 def _uv_transform(transform: JsonObject) -> Float64[np.ndarray, "2 3"]:
-    """KHR_texture_transform: translation · rotation · scale, as a 2 × 3 matrix.
+    """KHR_texture_transform as a 2 × 3 matrix: translation · rotation · scale.
 
-    The rotation is counter-clockwise with v pointing down, which the prose, the worked example and
-    the implementations agree on; the listing of the first text turned the other way (Khronos glTF
+    The rotation is counter-clockwise with v pointing down. The extension's prose, its worked example and the
+    implementations agree on this; the code listing in the first version had the opposite sign (Khronos glTF
     issue 1563).
     """
     offset = transform.numbers("offset", 2, default=(0.0, 0.0))
@@ -186,7 +189,7 @@ def _uv_transform(transform: JsonObject) -> Float64[np.ndarray, "2 3"]:
 def transformed_uv(
     uv: Float32[np.ndarray, "n 2"], transform: Float64[np.ndarray, "2 3"] | None
 ) -> Float32[np.ndarray, "n 2"]:
-    """Texture coordinates under `BaseColor.uv_transform`."""
+    """Texture coordinates transformed by `BaseColor.uv_transform`; unchanged if it is None."""
     if transform is None:
         return uv
     return (uv.astype(np.float64) @ transform[:, :2].T + transform[:, 2]).astype(np.float32)

@@ -1,4 +1,4 @@
-"""The glTF node hierarchy: which nodes the active scene shows, and where each stands in the world."""
+"""The glTF node hierarchy: the visible nodes of the active scene, and their transforms to world."""
 
 import numpy as np
 from jaxtyping import Float64
@@ -11,7 +11,11 @@ from vpltune.renderer.scene.scene import trs_matrices
 
 
 class GltfNodes:
-    """The nodes of one document, checked to be a forest."""
+    """The nodes of one document. The constructor checks that they form a forest.
+
+    Raises:
+        SceneFileError: a node has two parents or is its own ancestor, or there are too many nodes.
+    """
 
     def __init__(self, document: GltfDocument) -> None:
         count = len(document.root.members.get("nodes", ()))
@@ -24,10 +28,10 @@ class GltfNodes:
         self._world: dict[int, Float64[np.ndarray, "4 4"]] = {}
 
     def shown(self) -> list[int]:
-        """The nodes of the active scene, parents before children, without those marked invisible.
+        """Indices of the visible nodes of the active scene, parents before children.
 
         Raises:
-            SceneFileError: the scene names a node twice, one out of range, or one that has a parent.
+            SceneFileError: the scene names a node twice, a node with a parent, or one out of range.
         """
         pending = self._roots()[::-1]
         order = []
@@ -40,10 +44,10 @@ class GltfNodes:
         return order
 
     def to_world(self, index: int) -> Float64[np.ndarray, "4 4"]:
-        """Local to world, composed in double precision along the chain of parents, however long.
+        """A node's transform from local to world space, in double precision.
 
         Raises:
-            SceneFileError: a transform is malformed, or the product leaves the range of coordinates.
+            SceneFileError: a transform is malformed, or the product exceeds the range of coordinates.
         """
         chain = []
         at = index
@@ -75,7 +79,7 @@ class GltfNodes:
             scene = scenes[0]
             if len(scenes) > 1:
                 self._document.warnings.add(
-                    f"the file names none of its {len(scenes)} scenes: the first is read"
+                    f"the file selects none of its {len(scenes)} scenes: the first one is read"
                 )
         roots = scene.indices("nodes", len(self.nodes), "nodes")
         for root in roots:
@@ -84,7 +88,7 @@ class GltfNodes:
                     f"{scene.at('nodes')}: must be root nodes, got {root}, a child of another"
                 )
         if len(set(roots)) != len(roots):
-            raise SceneFileError(f"{scene.at('nodes')}: names a node twice")
+            raise SceneFileError(f"{scene.at('nodes')}: must not name a node twice")
         return roots
 
     def _checked_parents(self) -> list[int]:
@@ -96,9 +100,9 @@ class GltfNodes:
                         f"nodes[{child}]: must have one parent, got {parents[child]} and {index}"
                     )
                 parents[child] = index
-        # With one parent at most, what no root leads to goes round in a circle.
+        # Every node has at most one parent, so nodes that no root reaches form cycles.
         reached = [index for index, parent in enumerate(parents) if parent < 0]
-        for index in reached:  # grows as it is read
+        for index in reached:  # the list grows during the loop
             reached.extend(self.children[index])
         if len(reached) < len(parents):
             lost = min(set(range(len(parents))) - set(reached))
@@ -107,10 +111,10 @@ class GltfNodes:
 
 
 def local_matrix(node: JsonObject, document: GltfDocument) -> Float64[np.ndarray, "4 4"] | None:
-    """A node's matrix, or its translation · rotation · scale; None where it has none.
+    """A node's matrix, or its translation · rotation · scale; None if it has neither.
 
     Raises:
-        SceneFileError: not affine, both given at once, or a rotation that is none.
+        SceneFileError: the matrix is not affine, both forms are given, or the rotation is zero.
     """
     parts = [key for key in ("translation", "rotation", "scale") if key in node.members]
     if "matrix" in node.members:
@@ -128,11 +132,11 @@ def local_matrix(node: JsonObject, document: GltfDocument) -> Float64[np.ndarray
     length = np.linalg.norm(rotation)
     if not length > 0.0:
         raise SceneFileError(f"{node.at('rotation')}: must be a unit quaternion, got zero")
-    # 1e-3: quaternions printed with four digits pass in silence.
+    # 1e-3 accepts quaternions printed with four digits without a warning.
     if abs(length - 1.0) > 1e-3:
         document.warnings.tally(
-            "1 node has a rotation that is no unit quaternion; it is normalised",
-            "{n} nodes have rotations that are no unit quaternions; they are normalised",
+            "1 node has a rotation that is not a unit quaternion; it is normalised",
+            "{n} nodes have rotations that are not unit quaternions; they are normalised",
         )
     return trs_matrices(
         node.numbers("translation", 3, default=(0.0, 0.0, 0.0))[None],

@@ -1,4 +1,4 @@
-"""glTF mesh primitives: index lists, strips and fans with their attributes, made into meshes."""
+"""glTF mesh primitives: triangle lists, strips and fans, converted to meshes."""
 
 import re
 
@@ -16,8 +16,10 @@ from vpltune.renderer.scene.files.surface import Surface, finished_mesh, used_ve
 from vpltune.renderer.scene.scene import Mesh
 from vpltune.renderer.scene.scene_animation import Skinning
 
+# OpenGL enums of primitive modes, as in glTF. Smaller ones are points and lines.
 _TRIANGLES, _TRIANGLE_STRIP, _TRIANGLE_FAN = 4, 5, 6
 
+# Accessor types of vertex attributes (glTF 2.0 section 3.7.2.1).
 _ATTRIBUTE_TYPES = {
     "POSITION": ("VEC3",),
     "NORMAL": ("VEC3",),
@@ -29,14 +31,18 @@ _ATTRIBUTE_TYPES = {
 
 
 class GltfPrimitives:
-    """Reads the primitives of one document."""
+    """Reads the mesh primitives of one document."""
 
     def __init__(self, document: GltfDocument, accessors: GltfAccessors) -> None:
         self._document = document
         self._accessors = accessors
 
     def is_surface(self, primitive: JsonObject) -> bool:
-        """Whether a primitive is made of triangles; says so where it is not."""
+        """Whether a primitive has triangles with positions. If not, this adds a warning.
+
+        Raises:
+            SceneFileError: the mode is out of range, or the primitive has no attributes.
+        """
         warnings = self._document.warnings
         if primitive.integer("mode", _TRIANGLES, high=_TRIANGLE_FAN) < _TRIANGLES:
             warnings.tally(
@@ -53,13 +59,19 @@ class GltfPrimitives:
     def read(
         self, primitive: JsonObject, name: str, base_color: BaseColor, deformation: Deformation
     ) -> Mesh | None:
-        """The mesh of a primitive at rest: in world space where it is skinned, else in its node's.
+        """The mesh of a primitive at rest, in world space if it is skinned and else in its node's space.
+
+        Args:
+            primitive: the primitive object.
+            name: of the mesh.
+            base_color: its material, and the texture coordinates to read.
+            deformation: morph weights and skin.
 
         Returns:
-            None where no triangle has area.
+            None if no triangle has area.
 
         Raises:
-            SceneFileError: an index out of range, attributes of differing counts, or broken data behind.
+            SceneFileError: an index is out of range, attributes differ in count, or data are invalid.
         """
         attributes, corners = self._attributes_and_corners(primitive, base_color, deformation)
         triangles = _triangles(corners, primitive.integer("mode", _TRIANGLES), primitive.where)
@@ -135,7 +147,7 @@ class GltfPrimitives:
         used: Int64[np.ndarray, " used"],
         deformation: Deformation,
     ) -> tuple[Float32[np.ndarray, "used 3"], Float32[np.ndarray, "used 3"] | None, Skinning | None]:
-        """Positions and normals of the used vertices, morphed, then skinned; and by what, if that moves."""
+        """Morphed and skinned positions and normals of the used vertices, and the skinning if animated."""
         placed: dict[str, Float32[np.ndarray, "used 3"]] = {}
         for semantic in ("POSITION", "NORMAL"):
             if semantic in attributes:
@@ -166,8 +178,8 @@ class GltfPrimitives:
         stored = attributes.get(f"TEXCOORD_{base_color.uv_set}")
         if stored is None:
             self._document.warnings.tally(
-                "1 textured primitive lacks the texture's coordinates: (0, 0) is used throughout",
-                "{n} textured primitives lack their texture's coordinates: (0, 0) is used throughout",
+                "1 textured primitive has no texture coordinates; (0, 0) is used",
+                "{n} textured primitives have no texture coordinates; (0, 0) is used",
             )
             uv = np.zeros((len(used), 2), np.float32)
         else:
@@ -199,7 +211,7 @@ def _is_wanted(semantic: str, base_color: BaseColor, deformation: Deformation) -
 def _triangles(
     corners: Int64[np.ndarray, " corners"], mode: int, where: str
 ) -> Int64[np.ndarray, "triangles 3"]:
-    """Triangles of a list, strip or fan, wound as glTF 2.0 section 3.7.2.1 says."""
+    """The triangles of a list, strip or fan, with the winding of glTF 2.0 section 3.7.2.1."""
     if mode == _TRIANGLES:
         if len(corners) % 3:
             raise SceneFileError(
@@ -212,5 +224,5 @@ def _triangles(
         first = np.full(len(corners) - 2, corners[0])
         return np.stack([corners[1:-1], corners[2:], first], axis=1)
     triangles = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
-    triangles[1::2, 1:] = triangles[1::2, :0:-1]  # every other one runs the other way round
+    triangles[1::2, 1:] = triangles[1::2, :0:-1]  # every second triangle of a strip is reversed
     return triangles

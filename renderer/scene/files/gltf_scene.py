@@ -1,4 +1,4 @@
-"""A glTF document made into a scene: meshes, lights and cameras placed by the active scene's nodes."""
+"""Conversion of a glTF document to a scene: the meshes, lights and cameras of the active scene's nodes."""
 
 from pathlib import Path
 
@@ -22,8 +22,13 @@ from vpltune.renderer.scene.scene import Camera, Instance, Light, Mesh, Scene, t
 def read_gltf(path: Path, warnings: Warnings) -> Scene:
     """Read a .gltf or .glb file.
 
+    Args:
+        path: the file.
+        warnings: takes a line for each thing that is ignored or approximated.
+
     Raises:
-        SceneFileError: the file breaks a rule of glTF 2.0 that its image depends on, or a limit of ours.
+        SceneFileError: the file breaks a rule of glTF 2.0 that matters for the image, or exceeds a limit in
+            `renderer.scene.files.limits`.
     """
     document = open_gltf(path, warnings)
     builder = _SceneBuilder(document)
@@ -89,7 +94,7 @@ class _SceneBuilder:
         deformation = read_deformation(
             node, mesh, self.document, self.nodes, self.accessors, self._moving_nodes
         )
-        # A skinned mesh stands where its joints are, whatever its own node's transform.
+        # Only joints place a skinned mesh; its node's transform is ignored (glTF 2.0 section 3.7.3).
         is_placed_by_joints = deformation.joint_to_world is not None
         local = np.eye(4)[None] if is_placed_by_joints else self._placements(index, node)
         to_world = local if is_placed_by_joints else self.nodes.to_world(index) @ local
@@ -118,7 +123,7 @@ class _SceneBuilder:
     def _mesh_at_rest(
         self, node: JsonObject, primitive: JsonObject, mesh: JsonObject, deformation: Deformation
     ) -> int | None:
-        # Nodes share a mesh unless they bend it each in their own way.
+        # Nodes share a mesh unless they deform it differently.
         is_own = deformation.joint_to_world is not None or "weights" in node.members
         key = (primitive.where, node.where if is_own else "")
         if key not in self._meshes_at_rest:
@@ -130,10 +135,13 @@ class _SceneBuilder:
         return self._meshes_at_rest[key]
 
     def _placements(self, index: int, node: JsonObject) -> Float64[np.ndarray, "placements 4 4"]:
-        """From each instance of EXT_mesh_gpu_instancing to the node, else the identity; no flattened ones."""
+        """Transforms from the instances of EXT_mesh_gpu_instancing to the node; without it, the identity.
+
+        Instances whose scale leaves no area are dropped with a warning.
+        """
         instancing = node.extension("EXT_mesh_gpu_instancing")
         local = np.eye(4)[None] if instancing is None else self._instance_matrices(instancing)
-        # A surface needs two directions to have area; 1e-12 is far below float32's grain.
+        # A surface has area if two singular values are above zero. 1e-12 is far below float32's resolution.
         stretch = np.linalg.svd((self.nodes.to_world(index) @ local)[:, :3, :3], compute_uv=False)
         is_surface = stretch[:, 1] > 1e-12 * stretch[:, 0]
         for _ in range(int((~is_surface).sum())):

@@ -1,4 +1,4 @@
-"""Images as sRGB-encoded texels: any PNG, JPEG or WebP brought to eight bits of red, green and blue."""
+"""Decoding of images to sRGB-encoded texels with eight bits for each of red, green and blue."""
 
 import io
 import struct
@@ -17,13 +17,16 @@ from vpltune.renderer.scene.files.limits import (
     TEXELS_PER_BYTE,
 )
 
+# PIL's names of the formats that glTF and EXT_texture_webp allow.
 GLTF_FORMATS = ("PNG", "JPEG", "WEBP")
+# A choice: rows converted at a time. Converting all at once would hold a large image three times in memory.
 _STRIP_ROWS = 256
+# A choice: PIL's names of the formats accepted for OBJ, PLY and Mitsuba.
 MTL_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA")
 
 
 class ImageDecoder:
-    """Decodes the images of one scene, within its limit of texels."""
+    """Decodes the images of one scene and enforces the scene's texel limit."""
 
     def __init__(self, formats: tuple[str, ...]) -> None:
         self._formats = formats
@@ -31,15 +34,17 @@ class ImageDecoder:
         self._bytes = 0
 
     def decode(self, content: bytes, where: str) -> UInt8[np.ndarray, "height width 3"]:
-        """Texels, row 0 at the top; alpha, profiles, gamma and orientation are left aside, as glTF asks.
+        """The texels of an image file, row 0 at the top.
+
+        Alpha, colour profiles, gamma and orientation in the file are ignored, as glTF requires.
 
         Raises:
-            SceneFileError: not an image of a known format, broken, cut off, or too large.
+            SceneFileError: the format is unsupported, or the image is broken, cut off or too large.
         """
         try:
-            # The header alone is read here, so that size is judged before anything is unpacked.
+            # Opening reads the header only, so the size is checked before anything is unpacked.
             with warnings.catch_warnings():
-                # PIL says things of odd headers and large sizes; the size is judged here.
+                # PIL warns of odd headers and large sizes; `_check_size` decides on size.
                 warnings.simplefilter("ignore")
                 with Image.open(io.BytesIO(content), formats=self._formats) as image:
                     self._check_size(image.size, len(content), where)
@@ -49,9 +54,9 @@ class ImageDecoder:
         except Image.DecompressionBombError as error:
             raise SceneFileError(f"{where}: {error}") from error
         except (OSError, SyntaxError, ValueError, EOFError, struct.error, IndexError) as error:
-            # PIL's own words for an unknown format print a memory address.
+            # PIL's own message for an unknown format contains a memory address.
             cause = (
-                f"is no {', '.join(self._formats)}"
+                f"must be one of {', '.join(self._formats)}"
                 if "cannot identify" in str(error)
                 else f"is broken ({error})"
             )
@@ -77,7 +82,6 @@ class ImageDecoder:
 def _rgb(image: Image.Image) -> UInt8[np.ndarray, "height width 3"]:
     width, height = image.size
     texels = np.empty((height, width, 3), np.uint8)
-    # Strip by strip: whole, PIL's conversions would hold a large image three times over.
     for top in range(0, height, _STRIP_ROWS):
         strip = image.crop((0, top, width, min(top + _STRIP_ROWS, height)))
         texels[top : top + _STRIP_ROWS] = _strip_rgb(strip)
@@ -86,7 +90,7 @@ def _rgb(image: Image.Image) -> UInt8[np.ndarray, "height width 3"]:
 
 def _strip_rgb(strip: Image.Image) -> UInt8[np.ndarray, "height width _"]:
     if strip.mode.startswith("I") or strip.mode == "F":
-        # Sixteen-bit grey. PIL's own conversion to eight bits clips where it should divide by 257.
+        # 16-bit grey. PIL's own conversion to 8 bits clips values instead of dividing them by 257.
         return ((np.clip(np.asarray(strip), 0, 65535).astype(np.uint32) + 128) // 257).astype(np.uint8)[
             :, :, None
         ]

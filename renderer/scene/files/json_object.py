@@ -1,4 +1,4 @@
-"""JSON as it comes from strangers: parsed strictly, and asked for typed values by key."""
+"""Strict parsing of untrusted JSON, and typed access to its values."""
 
 import json
 import math
@@ -13,43 +13,49 @@ from vpltune.renderer.files.strict_json import DuplicateKeyError, unique_keys
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
 from vpltune.renderer.scene.files.limits import MAX_JSON_VALUES
 
-# Beyond this no number in a scene means anything, and sums and products in float64 stay finite.
+# A choice: numbers beyond this are rejected, so that sums and products stay finite in float64.
 _LARGEST_NUMBER = 1e30
 
 
 @dataclass(frozen=True, slots=True)
 class JsonObject:
-    """One JSON object and its place in the document, such as `meshes[3].primitives[0]`.
+    """A JSON object and its place in the document.
 
-    Every getter raises SceneFileError, naming the place and the value, where the value has the wrong type
-    or lies outside the range asked for. An absent key gives the default, and raises where there is none.
+    The getters return a typed value by key. If the key is absent, they return the default, if there is one.
+    They raise SceneFileError with place and value if the value has the wrong type or is out of range, or if
+    the key is absent and there is no default.
     """
 
     members: dict[str, Any]
     where: str
+    """The place, such as `meshes[3].primitives[0]`; empty for the whole document."""
 
     def at(self, key: str) -> str:
-        """The place of a member, for messages."""
+        """The place of a member in the document, for messages."""
         return f"{self.where}.{key}" if self.where else key
 
     def object(self, key: str) -> "JsonObject | None":
+        """An object; None if the key is absent."""
         if key not in self.members:
             return None
         return _as_object(self.members[key], self.at(key))
 
     def required_object(self, key: str) -> "JsonObject":
+        """An object."""
         return _as_object(self._required(key), self.at(key))
 
     def objects(self, key: str) -> list["JsonObject"]:
-        """The objects of a list; none where the key is absent."""
+        """A list of objects; empty if the key is absent."""
         place = self.at(key)
         return [_as_object(item, f"{place}[{i}]") for i, item in enumerate(self._list(key))]
 
     def extension(self, name: str) -> "JsonObject | None":
+        """The object `extensions.<name>` of glTF; None if it is absent."""
         extensions = self.object("extensions")
         return None if extensions is None else extensions.object(name)
 
     def string(self, key: str, default: str | None = None) -> str:
+        """A string."""
         if key not in self.members and default is not None:
             return default
         value = self._required(key)
@@ -58,6 +64,7 @@ class JsonObject:
         return value
 
     def strings(self, key: str) -> list[str]:
+        """A list of strings; empty if the key is absent."""
         values = self._list(key)
         for value in values:
             if not isinstance(value, str):
@@ -65,12 +72,14 @@ class JsonObject:
         return values
 
     def boolean(self, key: str, default: bool) -> bool:
+        """True or false."""
         value = self.members.get(key, default)
         if not isinstance(value, bool):
             raise self._wrong(key, "true or false", value)
         return value
 
     def integer(self, key: str, default: int | None = None, low: int = 0, high: int | None = None) -> int:
+        """A whole number from `low` to `high`. A float without a fraction counts as whole."""
         value = default if key not in self.members and default is not None else self._required(key)
         whole = _whole(value)
         if whole is None or whole < low or (high is not None and whole > high):
@@ -79,16 +88,17 @@ class JsonObject:
         return whole
 
     def index(self, key: str, length: int, of: str) -> int | None:
-        """An index into a list `of` that length; None where the key is absent."""
+        """An index into a list of that length, which messages call `of`; None if the key is absent."""
         if key not in self.members:
             return None
         return as_index(self.members[key], self.at(key), length, of)
 
     def required_index(self, key: str, length: int, of: str) -> int:
+        """An index into a list of that length, which messages call `of`."""
         return as_index(self._required(key), self.at(key), length, of)
 
     def indices(self, key: str, length: int, of: str) -> list[int]:
-        """A list of such indices; empty where the key is absent."""
+        """Indices into a list of that length, which messages call `of`; empty if the key is absent."""
         if key not in self.members:
             return []
         place = self.at(key)
@@ -97,6 +107,7 @@ class JsonObject:
     def number(
         self, key: str, default: float | None = None, low: float = -math.inf, high: float = math.inf
     ) -> float:
+        """A finite number from `low` to `high`."""
         value = default if key not in self.members and default is not None else self._required(key)
         if not _is_number(value) or not low <= value <= high:
             bounds = "" if low == -math.inf and high == math.inf else f" from {low:g} to {high:g}"
@@ -106,6 +117,7 @@ class JsonObject:
     def numbers(
         self, key: str, count: int, default: Sequence[float] | None = None
     ) -> Float64[np.ndarray, " count"]:
+        """A list of `count` finite numbers."""
         value = default if key not in self.members and default is not None else self._required(key)
         if not isinstance(value, list | tuple) or len(value) != count or not all(map(_is_number, value)):
             raise self._wrong(key, f"a list of {count} finite numbers", value)
@@ -127,18 +139,18 @@ class JsonObject:
 
 
 def parse_json(content: bytes) -> JsonObject:
-    """Parse a JSON document whose top is an object.
+    """Parse a JSON document whose top-level value is an object.
 
     Raises:
-        SceneFileError: not UTF-8, not JSON, a key twice in one object, NaN, an infinity, a number beyond
-            double precision, nesting too deep, or too many values.
+        SceneFileError: the content is not JSON in UTF-8, a key appears twice in one object, a number is not
+            finite in double precision, nesting is too deep, or there are too many values.
     """
-    # Commas and opening brackets bound the number of values from above.
+    # The number of commas and opening brackets is an upper bound for the number of values.
     if sum(content.count(mark) for mark in (b",", b"{", b"[")) > MAX_JSON_VALUES:
         raise SceneFileError(f"the document: must hold at most {MAX_JSON_VALUES:,} JSON values")
     try:
         document = json.loads(
-            content.decode("utf-8-sig"),  # glTF lets a reader pass over a byte order mark
+            content.decode("utf-8-sig"),  # glTF lets a reader ignore a byte order mark
             object_pairs_hook=unique_keys,
             parse_constant=_no_constant,
             parse_float=_finite_float,
@@ -155,10 +167,10 @@ def parse_json(content: bytes) -> JsonObject:
 
 
 def as_index(value: Any, where: str, length: int, of: str) -> int:
-    """`value` as an index into a list `of` that length.
+    """`value` as an index into a list of that length, which the message calls `of`.
 
     Raises:
-        SceneFileError: it is no whole number in range.
+        SceneFileError: the value is not a whole number from 0 to `length` − 1.
     """
     whole = _whole(value)
     if whole is None or not 0 <= whole < length:
@@ -167,7 +179,7 @@ def as_index(value: Any, where: str, length: int, of: str) -> int:
 
 
 def shown(value: Any) -> str:
-    """A value for a message: short, whatever it is."""
+    """Any value as a short text for messages."""
     if isinstance(value, dict | list | tuple) and len(value) > 16:
         return f"{'an object' if isinstance(value, dict) else 'a list'} of {len(value)} members"
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) > 10**30:
@@ -188,14 +200,14 @@ def _as_object(value: Any, where: str) -> JsonObject:
 
 
 def _is_number(value: Any) -> bool:
-    # bool is an int to Python, not to JSON.
+    # In Python, bool is a subclass of int.
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _LARGEST_NUMBER
 
 
 def _whole(value: Any) -> int | None:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
-    # 2**53: beyond it a float holds only every other whole number.
+    # Beyond 2**53 a double cannot represent every whole number.
     return int(value) if value == value // 1 and abs(value) <= 2**53 else None
 
 

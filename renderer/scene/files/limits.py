@@ -1,57 +1,68 @@
-"""How large a scene may be, tested before anything is allocated: a kilobyte can ask for a terabyte."""
+"""Size limits of scenes, checked before memory is allocated: a file of a kilobyte can ask for a terabyte."""
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
 
 MAX_FILE_BYTES = 1 << 29
-"""All files of a scene together. Half of the gibibyte that reading a scene may take."""
+"""A choice: all files of a scene together, half of the 1 GiB that reading a scene may take."""
 
 MAX_DECODED_BYTES = 1 << 29
-"""Vertex and index arrays made from them. The other half: some six million flat-shaded triangles."""
+"""A choice: all vertex and index arrays, the other half. That is about six million flat-shaded triangles."""
 
 MAX_JSON_VALUES = 2_000_000
-"""Python needs about 100 bytes and half a microsecond for each."""
+"""A choice. Python needs about 100 bytes and 0.5 µs for each value."""
 
 MAX_NODES = 1 << 17
+"""A choice: nodes of a glTF document."""
 
 MAX_INSTANCES = 10_000
-"""Each is a draw call of its own in every pass."""
+"""A choice. Each instance is a draw call in every pass."""
 
 MAX_CHANNELS = 10_000
-"""Of animations: each takes some 50 microseconds to read."""
+"""A choice: animation channels, which take about 50 µs each to read."""
 
 MAX_IMAGE_SIDE = 16384
-"""The smallest limit that OpenGL 4.3 lets a driver set."""
+"""Side of an image in texels. Every OpenGL 4.3 driver supports at least this (GL_MAX_TEXTURE_SIZE)."""
 
 MAX_IMAGE_TEXELS = 1 << 26
+"""A choice: texels of one image. A texel takes 3 bytes, or 7 during decoding."""
+
 MAX_SCENE_TEXELS = 3 << 26
-"""Three bytes each, and seven while an image is unpacked."""
+"""A choice: texels of all images of a scene."""
 
 FREE_TEXELS = 1 << 26
+"""A choice: texels that the images of a scene may have whatever the size of their files."""
+
 TEXELS_PER_BYTE = 64
-"""Beyond the free ones, texels must be paid for in bytes of image files: a photograph has two to ten
-to the byte, a kilobyte that unpacks to a megabyte has hundreds."""
+"""A choice: further texels that they may have for each byte of image files.
+
+A photograph has 2 to 10 texels per byte. A file that unpacks a kilobyte to a megabyte has hundreds.
+"""
 
 LARGEST_COORDINATE = 1e15
-"""Its square still fits a float32, with eight decades to spare."""
+"""A choice, in world units: its square fits a float32 with eight decades to spare."""
 
 SMALLEST_EXTENT = 1e-15
-"""A scene less wide than this has float32 areas that round to zero."""
+"""A choice: smallest diagonal of a scene in world units. Areas in a smaller scene underflow in float32."""
 
 LARGEST_RADIOMETRIC = 1e18
-"""Of a light's intensity: its product with any albedo and area stays finite in float32."""
+"""A choice: largest intensity of a light, W/sr or W/m². Times any albedo and area it is finite in float32."""
 
 
 class DecodedBytes:
-    """What is left of MAX_DECODED_BYTES while one scene is read."""
+    """The memory budget for decoded arrays while one scene is read, `MAX_DECODED_BYTES` at the start."""
 
     def __init__(self) -> None:
         self._left = MAX_DECODED_BYTES
 
     def spend(self, count: int, where: str) -> None:
-        """Take `count` bytes.
+        """Take `count` bytes from the budget.
+
+        Args:
+            count: bytes.
+            where: the place in the file, for the message.
 
         Raises:
-            SceneFileError: fewer are left.
+            SceneFileError: fewer bytes are left.
         """
         if count > self._left:
             raise SceneFileError(

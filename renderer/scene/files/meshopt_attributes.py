@@ -1,6 +1,6 @@
 """EXT_meshopt_compression, mode ATTRIBUTES: elements as byte-wise differences in groups of 16.
 
-Bitstream: EXT_meshopt_compression, appendix A (Kapoulkine 2022).
+The bitstream is specified in EXT_meshopt_compression, appendix A (Kapoulkine 2022).
 """
 
 import numpy as np
@@ -8,29 +8,41 @@ from jaxtyping import Int64, UInt8
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
 
+# All numbers are from the specification of the bitstream.
 _HEADER = 0xA0
+"""First byte of a stream of version 0."""
 _GROUP = 16
+"""Differences in a group."""
 _BLOCK_BYTES = 8192
+"""Most bytes of a decoded block."""
 _LARGEST_BLOCK = 256
+"""Most elements of a block."""
 _SMALLEST_TAIL = 32
+"""Least size in bytes of the tail, which ends with the baseline of the differences."""
 _PACKED_BYTES = (0, 4, 8, 16)
-"""Of a group in modes 0 to 3: all zero, 2 bits, 4 bits and 8 bits a difference."""
+"""Size in bytes of a group in modes 0 to 3: no bits (all zero), 2, 4 and 8 bits per difference."""
 
 
 def decode_attributes(
     content: bytes, count: int, stride: int, where: str
 ) -> UInt8[np.ndarray, "count stride"]:
-    """The `count` elements of `stride` bytes each.
+    """Decode `count` elements of `stride` bytes each.
+
+    Args:
+        content: the compressed stream.
+        count: number of elements.
+        stride: bytes per element, a multiple of 4 up to 256.
+        where: the place in the file, for messages.
 
     Raises:
-        SceneFileError: no stream of this mode, or cut off.
+        SceneFileError: the stream has another mode or version, or is cut off.
     """
     tail = max(stride, _SMALLEST_TAIL)
     if len(content) < 1 + tail or content[0] != _HEADER:
-        raise SceneFileError(f"{where}: holds no EXT_meshopt_compression stream of attributes, version 0")
+        raise SceneFileError(f"{where}: must be an EXT_meshopt_compression stream of attributes, version 0")
     end = len(content) - tail
     modes, places, blocks = _groups(content, end, count, stride, where)
-    # A group of 16 plain bytes reads past the end by what its last extra bytes may be.
+    # Vectorised reads of a group may go past its end, so pad the stream.
     stored = np.frombuffer(content + bytes(2 * _GROUP), np.uint8)
     differences = np.zeros((len(modes), _GROUP), np.uint8)
     for mode, bits in ((1, 2), (2, 4)):
@@ -53,9 +65,9 @@ def decode_attributes(
 def _groups(
     content: bytes, end: int, count: int, stride: int, where: str
 ) -> tuple[UInt8[np.ndarray, " groups"], Int64[np.ndarray, " groups"], list[tuple[int, int]]]:
-    """Mode and place of every group, and first element and size of every block.
+    """Mode and offset of every group, and first element and size of every block.
 
-    How long a group is stands in the group itself, so this is one walk through the stream.
+    The length of a group depends on its content, so this walks through the whole stream.
     """
     sentinels = {bits: _sentinels_by_byte(bits) for bits in (2, 4)}
     largest = min(_BLOCK_BYTES // stride & ~(_GROUP - 1), _LARGEST_BLOCK)
@@ -85,7 +97,7 @@ def _groups(
 
 
 def _sentinels_by_byte(bits: int) -> list[int]:
-    """How many of a byte's differences have all bits set, for each of the 256 bytes."""
+    """For each of the 256 bytes, how many of its differences have all bits set."""
     full = (1 << bits) - 1
     return [sum(byte >> shift & full == full for shift in range(0, 8, bits)) for byte in range(256)]
 
@@ -93,7 +105,7 @@ def _sentinels_by_byte(bits: int) -> list[int]:
 def _with_sentinels(
     stored: UInt8[np.ndarray, "bytes"], places: Int64[np.ndarray, " groups"], bits: int
 ) -> UInt8[np.ndarray, "groups 16"]:
-    """Groups of 2 or 4 bits a difference; where all bits are set, the difference follows as a byte."""
+    """Decode groups of 2 or 4 bits per difference. If all are set, the difference is a byte that follows."""
     packed = stored[places[:, None] + np.arange(2 * bits)]
     shifts = np.arange(8 - bits, -1, -bits, dtype=np.uint8)
     full = np.uint8((1 << bits) - 1)

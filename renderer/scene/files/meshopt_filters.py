@@ -1,12 +1,13 @@
-"""EXT_meshopt_compression's filters: attributes as they were before they were made compressible.
+"""EXT_meshopt_compression's filters, which restore attributes after decompression.
 
-Source: EXT_meshopt_compression, appendix B (Kapoulkine 2022). What a stream of bytes may hold beyond the
-filters' ranges is decoded to some value, never to an error: accessors check that floats are finite.
+They are specified in EXT_meshopt_compression, appendix B (Kapoulkine 2022). Input outside a filter's range
+decodes to some value without an error; accessors check that floats are finite.
 """
 
 import numpy as np
 from jaxtyping import UInt8
 
+# The strides in bytes that the specification allows for each filter.
 _WORDS = range(4, 257, 4)
 FILTER_STRIDES = {
     "NONE": _WORDS,
@@ -17,7 +18,7 @@ FILTER_STRIDES = {
 
 
 def unfiltered(elements: UInt8[np.ndarray, "count stride"], kind: str) -> UInt8[np.ndarray, "count stride"]:
-    """Elements after their filter `kind`, one of `FILTER_STRIDES` and with a stride that it allows."""
+    """The elements with the filter `kind` undone. `kind` and stride must be among `FILTER_STRIDES`."""
     if kind == "NONE" or not len(elements):
         return elements
     decode = {"OCTAHEDRAL": _octahedral, "QUATERNION": _quaternion, "EXPONENTIAL": _exponential}[kind]
@@ -25,7 +26,7 @@ def unfiltered(elements: UInt8[np.ndarray, "count stride"], kind: str) -> UInt8[
 
 
 def _octahedral(elements: UInt8[np.ndarray, "count stride"]) -> np.ndarray:
-    """Unit vectors as normalised integers; the fourth component passes through."""
+    """Decode octahedral unit vectors to normalised integers. The fourth component is unchanged."""
     dtype = np.dtype("i1") if elements.shape[1] == 4 else np.dtype("<i2")
     stored = elements.view(dtype)
     one = np.where(stored[:, 2:3] == 0, 1, stored[:, 2:3]).astype(np.float32)
@@ -40,7 +41,7 @@ def _octahedral(elements: UInt8[np.ndarray, "count stride"]) -> np.ndarray:
 
 
 def _quaternion(elements: UInt8[np.ndarray, "count stride"]) -> np.ndarray:
-    """Unit quaternions as normalised integers, from the three components that are not the largest."""
+    """Decode unit quaternions, stored without their largest component, to normalised integers."""
     stored = elements.view("<i2")
     one = (stored[:, 3:4] | 3).astype(np.float32)
     rest = stored[:, :3] / one * np.float32(np.sqrt(0.5))
@@ -53,6 +54,6 @@ def _quaternion(elements: UInt8[np.ndarray, "count stride"]) -> np.ndarray:
 
 
 def _exponential(elements: UInt8[np.ndarray, "count stride"]) -> np.ndarray:
-    """Floats from 8 bits of exponent and 24 of mantissa, both signed."""
+    """Decode floats from a signed 8-bit exponent and a signed 24-bit mantissa."""
     stored = elements.view("<i4")
     return np.ldexp(((stored << 8) >> 8).astype("<f4"), stored >> 24)

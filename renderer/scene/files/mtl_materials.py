@@ -1,4 +1,4 @@
-"""Wavefront MTL: the diffuse colour and diffuse map of materials; the rest is outside a diffuse model."""
+"""Wavefront MTL: the diffuse colour and map of materials. A diffuse material has no use for the rest."""
 
 from dataclasses import dataclass, field
 
@@ -10,7 +10,7 @@ from vpltune.renderer.scene.files.image_texels import MTL_FORMATS, ImageDecoder
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
 from vpltune.renderer.scene.scene import Material, Texture, Wrap
 
-# Options of map_Kd and how many words follow each; -o, -s and -t take one to three numbers.
+# Options of map_Kd and how many words follow each. The options in `_TRANSFORMS` take one to three numbers.
 _MAP_OPTIONS = {
     "-blendu": 1,
     "-blendv": 1,
@@ -33,7 +33,7 @@ class _Definition:
 
 
 class MtlMaterials:
-    """The materials of an OBJ file: defined by its libraries, made when first used."""
+    """The materials of an OBJ file. Libraries define them; `add` creates them when they are used."""
 
     def __init__(self, folder: SceneFolder, warnings: Warnings) -> None:
         self._folder = folder
@@ -46,10 +46,12 @@ class MtlMaterials:
         self.textures: list[Texture] = []
 
     def read_library(self, names: str) -> None:
-        """Read what stands after `mtllib`: one file whose name may hold spaces, or several.
+        """Read the libraries of an `mtllib` line: one file whose name may have spaces, or several files.
+
+        A library that cannot be read adds a warning.
 
         Raises:
-            SceneFileError: a library is there but breaks a rule.
+            SceneFileError: a library breaks a rule.
         """
         try:
             self._read_one(names)
@@ -61,10 +63,10 @@ class MtlMaterials:
                     self._warnings.add(f"material library {name!r:.80} cannot be read; white is used")
 
     def add(self, name: str) -> int:
-        """The index in `materials` of a newly made material; white where no library defines it.
+        """Create a material, white if no library defines it, and return its index in `materials`.
 
         Raises:
-            SceneFileError: its map is there but is a broken image.
+            SceneFileError: the material's map exists but is a broken image.
         """
         definition = self._definitions.get(name)
         if definition is None and name:
@@ -77,12 +79,12 @@ class MtlMaterials:
         return len(self.materials) - 1
 
     def say_what_is_missing(self) -> None:
-        """Add one warning line for all maps that could not be opened."""
+        """Add one warning for all maps that could not be read."""
         if self._missing_maps:
             self._warnings.add(
                 f"{len(self._missing_maps)} texture{'s' * (len(self._missing_maps) > 1)} missing "
                 f"({one_line(self._missing_maps[0], 80)!r}{', …' * (len(self._missing_maps) > 1)}); "
-                "Kd is used alone, white where there is none"
+                "Kd alone is used, or white without it"
             )
 
     def _texture(self, definition: _Definition) -> int | None:
@@ -140,7 +142,7 @@ class MtlMaterials:
     def _color(self, rest: str, where: str) -> Float32[np.ndarray, "3"]:
         words = rest.split()
         if words and words[0] in ("spectral", "xyz"):
-            self._warnings.add(f"colours given as {words[0]} are not read; white is used")
+            self._warnings.add(f"colours given as {words[0]} are not supported; white is used")
             return np.ones(3, np.float32)
         try:
             color = np.array(words[:3] * (3 if len(words) == 1 else 1), np.float32)
@@ -172,7 +174,7 @@ class MtlMaterials:
                     at += 1
             else:
                 at += 1 + _MAP_OPTIONS.get(option, 0)
-        # The path is the rest of the line as written, spaces and all.
+        # The path is the rest of the line, including spaces.
         definition.map_path = rest.split(None, at)[at] if at < len(words) else ""
 
 

@@ -1,8 +1,7 @@
-"""Wavefront OBJ read into a scene, one mesh for each material.
+"""Reader for Wavefront OBJ. A scene gets one mesh for each material.
 
-Read here rather than by trimesh, which (5.2) splits concave faces as fans, counts negative indices
-from the end of the file instead of from the line they stand in, and drops normals, textures and
-whole materials in silence.
+trimesh 5.2 is not used because it splits concave faces as fans, counts negative indices from the end of the
+file instead of from the current line, and silently drops normals, textures and whole materials.
 """
 
 from dataclasses import dataclass, field
@@ -20,7 +19,7 @@ from vpltune.renderer.scene.files.scene_folder import SceneFolder
 from vpltune.renderer.scene.files.surface import Surface, finished_mesh, used_vertices
 from vpltune.renderer.scene.scene import Instance, Mesh, Scene
 
-# Grouping, levels of detail and display hints, none of which changes a surface.
+# Grouping, levels of detail and display hints, which do not change the surface: no warning for these.
 _SILENT_KEYWORDS = frozenset(
     (
         "o",
@@ -37,6 +36,7 @@ _SILENT_KEYWORDS = frozenset(
         "trace_obj",
     )
 )
+# Free-form curves and surfaces, which are ignored with a warning.
 _FREE_FORM_KEYWORDS = frozenset(
     (
         "vp",
@@ -58,13 +58,13 @@ _FREE_FORM_KEYWORDS = frozenset(
         "stech",
     )
 )
-# Python objects of one vertex or corner while the text is taken apart.
+# Estimated memory in bytes of the Python objects for one line while the text is parsed.
 _BYTES_PER_LINE = 300
 
 
 @dataclass
 class _Faces:
-    """Faces of one material: corners as numbers into `_ObjText.corners`, and how many each face has."""
+    """Faces of one material: corners as indices into `_ObjText.corners`, and each face's corner count."""
 
     corners: list[int] = field(default_factory=list)
     sizes: list[int] = field(default_factory=list)
@@ -72,19 +72,23 @@ class _Faces:
 
 @dataclass
 class _ObjText:
-    """What the lines of an OBJ file say."""
+    """The parsed lines of an OBJ file."""
 
     vertices: list[list[str]] = field(default_factory=list)
     uvs: list[list[str]] = field(default_factory=list)
     normals: list[list[str]] = field(default_factory=list)
     corners: dict[tuple[int, int, int], int] = field(default_factory=dict)
-    """Each distinct (vertex, uv, normal), counted from 0 and −1 where absent, and its number."""
+    """The index of each distinct (vertex, uv, normal). These count from 0; −1 if absent."""
     faces: dict[str, _Faces] = field(default_factory=dict)
     libraries: list[str] = field(default_factory=list)
 
 
 def read_obj(path: Path, warnings: Warnings) -> Scene:
-    """Read an OBJ file. Kd is linear; maps and vertex colours are sRGB; v of a texture runs upwards.
+    """Read an OBJ file. Kd is linear, maps and vertex colours are sRGB-encoded, and v points up in images.
+
+    Args:
+        path: the file; its material libraries and maps must be in the same folder or below.
+        warnings: takes a line for each thing that is ignored or approximated.
 
     Raises:
         SceneFileError: the text breaks a rule, an index is out of range, or a number is not finite.
@@ -136,7 +140,9 @@ def _parse(content: str, warnings: Warnings) -> _ObjText:
         elif keyword in _FREE_FORM_KEYWORDS:
             warnings.add("free-form curves and surfaces are ignored")
         elif keyword not in _SILENT_KEYWORDS:
-            warnings.tally("1 line of unknown meaning is ignored", "{n} lines of unknown meaning are ignored")
+            warnings.tally(
+                "1 line with an unknown keyword is ignored", "{n} lines with unknown keywords are ignored"
+            )
     return text
 
 
@@ -157,7 +163,7 @@ def _parse_face(words: list[str], text: _ObjText, faces: _Faces, where: str, war
 
 
 def _corner(word: str, text: _ObjText, where: str) -> int:
-    """The number of the corner written `v`, `v/vt`, `v//vn` or `v/vt/vn`."""
+    """The index of a corner written as `v`, `v/vt`, `v//vn` or `v/vt/vn`."""
     parts = word.split("/")
     lists = (text.vertices, text.uvs, text.normals)
     resolved = [-1, -1, -1]
@@ -170,7 +176,7 @@ def _corner(word: str, text: _ObjText, where: str) -> int:
             index = int(part)
         except ValueError:
             index = 0
-        # Forward references are allowed, and tested once all is read; negative ones count back from here.
+        # Forward references are allowed and checked at the end. Negative indices count back from this line.
         resolved[i] = index - 1 if index > 0 else len(lists[i]) + index
         if index == 0 or resolved[i] < 0:
             raise SceneFileError(
@@ -218,7 +224,7 @@ def _surface(
     vertices, uvs, normals = pools
     uv = normal = None
     if (keys[:, 1] >= 0).any():
-        # A row of zeros at the end serves the corners that have none (index −1).
+        # Corners without a uv have the index −1, which picks the row of zeros at the end.
         uv = np.concatenate([uvs * (1.0, -1.0) + (0.0, 1.0), np.zeros((1, 2))])[keys[:, 1]].astype(np.float32)
     if (keys[:, 2] >= 0).any():
         normal = np.concatenate([normals, np.zeros((1, 3))])[keys[:, 2]].astype(np.float32)
@@ -234,7 +240,7 @@ def _surface(
 def _vertices(
     lines: list[list[str]], warnings: Warnings
 ) -> tuple[Float64[np.ndarray, "v 3"], Float32[np.ndarray, "v 3"] | None]:
-    """Positions, and vertex colours where any line has them: x y z r g b, or x y z w r g b."""
+    """Positions, and vertex colours if any line has them: x y z r g b, or x y z w r g b."""
     positions = _numbers(lines, 3, "v")
     colored = [i for i, words in enumerate(lines) if len(words) >= 6]
     if not colored:
@@ -247,14 +253,14 @@ def _vertices(
 
 
 def _numbers(lines: list[list[str]], count: int, keyword: str) -> Float64[np.ndarray, "lines count"]:
-    """The first `count` numbers of each line; a missing second coordinate of vt is 0."""
+    """The first `count` numbers of each line. A vt with one number gets 0 for the second."""
     if keyword == "vt":
         lines = [words if len(words) > 1 else [*words, "0"] for words in lines]
     try:
         values = np.array([words[:count] for words in lines], np.float64).reshape(len(lines), count)
     except ValueError:
         values = np.full((1, 1), np.nan)
-    # Beyond 1e30 nothing is a coordinate; float32 would make it infinite.
+    # Larger coordinates make no sense and would overflow float32.
     if not (np.abs(values) <= 1e30).all():
         bad = next((words for words in lines if not _all_finite(words[:count], count)), [])
         raise SceneFileError(f"{keyword}: must be {count} finite numbers, got {' '.join(bad)!r:.60}")

@@ -1,4 +1,4 @@
-"""PLY taken apart: header, and the columns of its elements, from ASCII or binary data."""
+"""Parser for PLY: the header, and the columns of its elements from ASCII or binary data."""
 
 import struct
 from dataclasses import dataclass, field
@@ -9,19 +9,23 @@ from jaxtyping import Float64, Int64
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
 from vpltune.renderer.scene.files.limits import DecodedBytes
 
+# PLY's scalar types as format characters of the struct module.
 _TYPES = {
     "char": "b", "int8": "b", "uchar": "B", "uint8": "B", "short": "h", "int16": "h", "ushort": "H",
     "uint16": "H", "int": "i", "int32": "i", "uint": "I", "uint32": "I", "float": "f", "float32": "f",
     "double": "d", "float64": "d",
 }  # fmt: skip
+# Byte orders of the struct module by the name of the format; ASCII has none.
 _BYTE_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
+# A choice: most bytes of a header.
 _LONGEST_HEADER = 1 << 16
+# A choice: most characters of a number in ASCII data.
 _LONGEST_NUMBER = 64
 
 
 @dataclass(frozen=True)
 class PlyProperty:
-    """A scalar property, or with a `count_type` a list; types are those of the struct module."""
+    """A scalar property, or a list if it has a `count_type`. Types are those of the struct module."""
 
     name: str
     type: str
@@ -30,6 +34,8 @@ class PlyProperty:
 
 @dataclass(frozen=True)
 class PlyElement:
+    """An element of the header, such as vertex or face: `count` rows of properties."""
+
     name: str
     count: int
     properties: list[PlyProperty] = field(default_factory=list)
@@ -37,29 +43,32 @@ class PlyElement:
 
 @dataclass(frozen=True)
 class PlyHeader:
+    """A parsed header."""
+
     byte_order: str
-    """"<" or ">", empty for ASCII."""
+    """"<" or ">"; empty for ASCII."""
     elements: list[PlyElement]
     texture_name: str
+    """The file in a TextureFile comment; empty if there is none."""
     size: int
-    """In bytes; the data follow."""
+    """Size of the header in bytes. The data follow it."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlyColumn:
-    """One property over all rows of its element; of a list property, all rows' values one after another."""
+    """A property of all rows of an element. The lists of a list property are concatenated."""
 
     values: Float64[np.ndarray, " values"]
     type: str
     sizes: Int64[np.ndarray, " rows"] | None = None
-    """The length of each row's list; None for a scalar property."""
+    """Length of each row's list; None for a scalar property."""
 
 
 def parse_ply_header(content: bytes) -> PlyHeader:
-    """Read the header.
+    """Parse the header at the start of a file.
 
     Raises:
-        SceneFileError: it is no PLY header.
+        SceneFileError: the content does not start with a valid PLY header.
     """
     end = content.find(b"end_header", 0, _LONGEST_HEADER)
     if not content.startswith(b"ply") or end < 0:
@@ -94,7 +103,7 @@ def parse_ply_header(content: bytes) -> PlyHeader:
 
 
 class PlyData:
-    """The data of a PLY file, read element by element in the header's order."""
+    """The data of a PLY file. Read its elements one by one in the header's order."""
 
     def __init__(self, content: bytes, header: PlyHeader, decoded: DecodedBytes) -> None:
         self._order = header.byte_order
@@ -106,18 +115,18 @@ class PlyData:
 
     @property
     def left(self) -> int:
-        """Bytes, or numbers of an ASCII file, that no element has taken."""
+        """Number of bytes (binary) or numbers (ASCII) not read yet."""
         return len(self._source) - self._at
 
     def read(self, element: PlyElement) -> dict[str, PlyColumn]:
         """The columns of the next element.
 
         Raises:
-            SceneFileError: the data are cut off, or a list has a negative or fractional length.
+            SceneFileError: the data are cut off, or a list's length is negative, fractional or too large.
         """
         if not element.count or not element.properties:
             return {p.name: PlyColumn(np.empty(0), p.type, _no_rows(p)) for p in element.properties}
-        # Every row has at least one number for each property.
+        # Every row has at least one number per property.
         least = element.count * sum(self._width(p.count_type or p.type) for p in element.properties)
         if least > self.left:
             raise SceneFileError(f"element '{element.name:.40}': its {element.count} rows are cut off")
@@ -126,7 +135,7 @@ class PlyData:
         return self._read_row_by_row(element) if columns is None else columns
 
     def _read_alike(self, element: PlyElement) -> dict[str, PlyColumn] | None:
-        """All rows at once, if every list is as long as in the first row; else None."""
+        """All rows at once if all lists have the same lengths as in the first row, else None."""
         lengths, offset = [], self._at
         for p in element.properties:
             length = 1
@@ -157,7 +166,7 @@ class PlyData:
     def _read_row_by_row(self, element: PlyElement) -> dict[str, PlyColumn]:
         sizes: dict[str, list[int]] = {p.name: [] for p in element.properties}
         values: dict[str, list[float]] = {p.name: [] for p in element.properties}
-        # Python numbers: at most one for each byte that is left.
+        # Python numbers take 40 bytes each, and there is at most one per byte of data.
         self._decoded.spend(min(40 * self.left, 1 << 62), f"element '{element.name:.40}'")
         for _ in range(element.count):
             for p in element.properties:
@@ -188,7 +197,7 @@ class PlyData:
         }
 
     def _width(self, type_: str) -> int:
-        """Of one number in the source: bytes, or one for an ASCII file's numbers."""
+        """Size of a number in the source: its bytes, or 1 for ASCII, where the source is an array."""
         return struct.calcsize(f"<{type_}") if self._order else 1
 
     def _number(self, at: int, type_: str, element: PlyElement) -> int:

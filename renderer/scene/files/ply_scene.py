@@ -1,7 +1,7 @@
-"""Stanford PLY read into a scene of one mesh.
+"""Reader for Stanford PLY. A scene gets one mesh.
 
-Read here rather than by trimesh, which (5.2) takes the corner count of a binary file's first face
-for all of them, splits concave faces as fans, and drops what it cannot match in silence.
+trimesh 5.2 is not used because it applies the corner count of a binary file's first face to all faces, splits
+concave faces as fans, and silently drops what it cannot match.
 """
 
 from pathlib import Path
@@ -19,15 +19,21 @@ from vpltune.renderer.scene.files.scene_folder import SceneFolder
 from vpltune.renderer.scene.files.surface import Surface, finished_mesh
 from vpltune.renderer.scene.scene import Instance, Material, Scene, Texture
 
+# Property names in use for texture coordinates and colours. PLY itself defines none.
 _UV_NAMES = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"))
 _COLOR_NAMES = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
+# The value of white in each type.
 _FULL_SCALE = {"B": 255.0, "H": 65535.0, "f": 1.0, "d": 1.0}
 
 Columns = dict[str, PlyColumn]
 
 
 def read_ply(path: Path, warnings: Warnings) -> Scene:
-    """Read a PLY file. Colours of any type are sRGB-encoded; v of texture coordinates runs upwards.
+    """Read a PLY file. Colours of any type are sRGB-encoded, and v points up in images.
+
+    Args:
+        path: the file; its texture must be in the same folder or below.
+        warnings: takes a line for each thing that is ignored or approximated.
 
     Raises:
         SceneFileError: header or data break a rule, the data are cut off, or an index is out of range.
@@ -47,7 +53,7 @@ def read_ply(path: Path, warnings: Warnings) -> Scene:
     mesh = None if surface is None else finished_mesh(surface, name, 0, decoded, "element 'face'")
     textures = () if mesh is None or surface.uv is None else _textures(header, folder, warnings)
     if header.texture_name and not textures:
-        warnings.add(f"texture {header.texture_name!r:.80} is not used; white is")
+        warnings.add(f"texture {header.texture_name!r:.80} is not used; white is used instead")
     return Scene(
         name=name,
         meshes=() if mesh is None else (mesh,),
@@ -81,7 +87,7 @@ def _surface(vertex: Columns, face: Columns, warnings: Warnings) -> Surface | No
     corner_colors = None if attributes[2] is not None else _colors(face, warnings)
     if corner_uv is None and corner_colors is None:
         return Surface(positions.astype(np.float32), corners[triangles], *attributes)
-    # What belongs to a face's corner needs a vertex for each corner.
+    # Attributes of face corners need a vertex for each corner.
     normals, uv, colors = (None if rows is None else rows[corners] for rows in attributes)
     if corner_colors is not None:
         colors = np.repeat(corner_colors, indices.sizes, axis=0)
@@ -100,7 +106,7 @@ def _triangles(
     positions: Float64[np.ndarray, "vertices 3"],
     warnings: Warnings,
 ) -> Int64[np.ndarray, "triangles 3"]:
-    """Triangles as numbers into `corners`."""
+    """Triangles as indices into `corners`."""
     is_polygon = sizes >= 3
     if is_polygon.all():
         return triangulated(sizes, positions[corners], "element 'face'")
@@ -115,7 +121,7 @@ def _stacked(
     if not all(name in columns and columns[name].sizes is None for name in names):
         return None
     stacked = np.stack([columns[name].values for name in names], axis=1)
-    # Beyond 1e30 nothing is a coordinate; float32 would make it infinite.
+    # Larger coordinates make no sense and would overflow float32.
     if not (np.abs(stacked) <= 1e30).all():
         raise SceneFileError(f"{where}: {', '.join(names)} must be finite")
     return stacked
@@ -125,7 +131,7 @@ def _uv(vertex: Columns) -> Float32[np.ndarray, "rows 2"] | None:
     for names in _UV_NAMES:
         uv = _stacked(vertex, names, "element 'vertex'")
         if uv is not None:
-            return _turned_over(uv)
+            return _flipped_v(uv)
     return None
 
 
@@ -135,10 +141,10 @@ def _corner_uv(face: Columns, sizes: Int64[np.ndarray, " faces"]) -> Float32[np.
         return None
     if (texcoord.sizes != 2 * sizes).any() or not (np.abs(texcoord.values) <= 1e30).all():
         raise SceneFileError("element 'face': texcoord must have two finite numbers for each corner")
-    return _turned_over(texcoord.values.reshape(-1, 2))
+    return _flipped_v(texcoord.values.reshape(-1, 2))
 
 
-def _turned_over(uv: Float64[np.ndarray, "rows 2"]) -> Float32[np.ndarray, "rows 2"]:
+def _flipped_v(uv: Float64[np.ndarray, "rows 2"]) -> Float32[np.ndarray, "rows 2"]:
     return (uv * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32)
 
 

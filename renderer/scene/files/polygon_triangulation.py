@@ -1,11 +1,11 @@
-"""Polygons of OBJ and PLY faces cut into triangles, concave ones too."""
+"""Triangulation of the polygons in OBJ and PLY files, including concave ones."""
 
 import numpy as np
 from jaxtyping import Float64, Int64
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
 
-# Ear clipping takes time with the square of it; faces of more corners are not drawn by people.
+# A choice: most corners of a face. Ear clipping takes quadratic time, and hand-made faces have far fewer.
 _MOST_CORNERS = 2000
 
 
@@ -14,15 +14,15 @@ def triangulated(
     positions: Float64[np.ndarray, "corner_count 3"],
     where: str,
 ) -> Int64[np.ndarray, "triangles 3"]:
-    """Triangles of faces, as corner numbers, faces in their order and with their winding.
+    """Triangles as corner indices. They keep the order and the winding of the faces.
 
     Args:
-        sizes: how many corners each face has, at least 3; the corners of all faces are numbered in a row.
-        positions: of each corner.
-        where: the file's place for messages.
+        sizes: corner count of each face, at least 3. The corners of all faces are numbered consecutively.
+        positions: position of each corner.
+        where: the place in the file, for messages.
 
     Raises:
-        SceneFileError: a face has more corners than can be cut in reasonable time.
+        SceneFileError: a face has too many corners to be triangulated in reasonable time.
     """
     if sizes.max(initial=0) > _MOST_CORNERS:
         raise SceneFileError(f"{where}: a face must have at most {_MOST_CORNERS} corners, got {sizes.max()}")
@@ -49,7 +49,7 @@ def _triangulated_alike(
         return fans
     a, b, c = (positions[fans[:, :, i]] for i in range(3))
     areas = np.cross(b - a, c - a)
-    # Newell's normal of the whole polygon; where every triangle of the fan agrees with it, the fan holds.
+    # Newell's normal of the whole polygon. If all triangles of the fan face its way, the fan is valid.
     whole = areas.sum(axis=1, keepdims=True)
     for face in np.flatnonzero(((areas * whole).sum(axis=2) < 0.0).any(axis=1)):
         fans[face] = polygons[face][_clipped_ears(positions[polygons[face]], whole[face, 0])]
@@ -59,10 +59,10 @@ def _triangulated_alike(
 def _clipped_ears(
     points: Float64[np.ndarray, "size 3"], normal: Float64[np.ndarray, "3"]
 ) -> Int64[np.ndarray, "size_less_2 3"]:
-    """Ear clipping (Meisters 1975) in the plane that the polygon covers most of."""
+    """Ear clipping (Meisters 1975) of the polygon projected along the dominant axis of its normal."""
     drop = int(np.abs(normal).argmax())
     flat = np.delete(points, drop, axis=1)
-    # Dropping y turns the plane over.
+    # Dropping y mirrors the projection.
     if (normal[drop] < 0.0) != (drop == 1):
         flat = flat[:, ::-1]
     left = list(range(len(points)))
@@ -70,7 +70,7 @@ def _clipped_ears(
     while len(left) > 3:
         ear = next(
             (i for i in range(len(left)) if _is_ear(flat, left, i)), 0
-        )  # 0: a crossed outline has none
+        )  # 0: a self-intersecting outline may have no ear
         triangles.append((left[ear - 1], left[ear], left[(ear + 1) % len(left)]))
         del left[ear]
     triangles.append(tuple(left))
@@ -86,7 +86,7 @@ def _is_ear(flat: Float64[np.ndarray, "size 2"], left: list[int], at: int) -> bo
     inside = np.ones(len(others), bool)
     for start, end in edges:
         inside &= _turn(start, end, others.T) >= 0.0
-    # A corner that stands exactly on one of the ear's own (a hole joined by a seam) does not block it.
+    # A corner at the same position as one of the ear's own, as at the seam of a hole, does not block it.
     for corner in (before, tip, after):
         inside &= (others != corner).any(axis=1)
     return not inside.any()
@@ -95,5 +95,5 @@ def _is_ear(flat: Float64[np.ndarray, "size 2"], left: list[int], at: int) -> bo
 def _turn(
     start: Float64[np.ndarray, "2"], end: Float64[np.ndarray, "2"], point: Float64[np.ndarray, " 2 *points"]
 ) -> np.float64 | Float64[np.ndarray, "*points"]:
-    """Twice the signed area of the triangle, positive where it turns to the left."""
+    """Twice the signed area of a triangle; positive if it turns left."""
     return (end[0] - start[0]) * (point[1] - start[1]) - (end[1] - start[1]) * (point[0] - start[0])

@@ -1,4 +1,4 @@
-"""Reading files, but only regular ones, of a bounded size, inside the scene's own folder."""
+"""Restricted file access: regular files of bounded size inside the scene's folder."""
 
 import os
 import stat
@@ -9,34 +9,38 @@ from vpltune.renderer.scene.files.limits import MAX_FILE_BYTES
 
 
 class SceneFolder:
-    """The folder a scene file stands in: whatever the file refers to is looked for here and nowhere else."""
+    """The folder of a scene file. Files that the scene refers to are read from here and nowhere else."""
 
     def __init__(self, scene_path: Path) -> None:
         self._root = scene_path.parent.resolve()
         self._left = MAX_FILE_BYTES
 
     def read_scene_file(self, path: Path) -> bytes:
-        """The bytes of the scene file itself, which the user named and which may be a link to anywhere.
+        """The bytes of the scene file itself. The user named it, so it may be a link to anywhere.
 
         Raises:
-            SceneFileError: it is missing, not a regular file, unreadable or too large.
+            SceneFileError: the file is missing, not regular, unreadable or too large.
         """
         return self._read(path, "")
 
     def read(self, relative: str, where: str) -> bytes:
-        """The bytes of a file that the scene refers to, by a path relative to the folder.
+        """The bytes of a file that the scene refers to.
+
+        Args:
+            relative: path relative to the folder.
+            where: the place of the reference, for messages.
 
         Raises:
-            SceneFileError: the path leads out of the folder (links followed), or the file is missing, not
-                regular, unreadable, or too large together with what was read before.
+            SceneFileError: the path leads out of the folder, also by a link, or the file is missing, not
+                regular or unreadable, or all files read so far are too large together.
         """
         return self._read(self._inside(relative, where), f"{where}: {relative!r:.80} ")
 
     def has(self, relative: str, where: str) -> bool:
-        """Whether `relative` leads to something inside the folder.
+        """Whether `relative` exists inside the folder.
 
         Raises:
-            SceneFileError: it leads out of the folder.
+            SceneFileError: the path leads out of the folder.
         """
         return self._inside(relative, where).exists()
 
@@ -46,7 +50,7 @@ class SceneFolder:
             raise SceneFileError(f"{where}: must name a file in the scene's folder, got {shown}")
         try:
             resolved = (self._root / relative).resolve()
-        except (OSError, RuntimeError) as error:  # a name too long; a loop of links (Python < 3.13)
+        except (OSError, RuntimeError) as error:  # too long a name; a loop of links (Python < 3.13)
             raise SceneFileError(f"{where}: {shown} cannot be opened ({_cause(error)})") from error
         if not resolved.is_relative_to(self._root):
             raise SceneFileError(f"{where}: must stay inside the scene's folder, got {shown}")
@@ -54,7 +58,7 @@ class SceneFolder:
 
     def _read(self, path: Path, subject: str) -> bytes:
         try:
-            # Looked at before it is opened: opening a device can have effects, and a FIFO blocks.
+            # Check before opening: opening a device can have side effects, and opening a FIFO blocks.
             if not stat.S_ISREG(path.stat().st_mode):
                 raise SceneFileError(f"{subject}is not a regular file")
             handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)

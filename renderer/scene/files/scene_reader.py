@@ -1,4 +1,4 @@
-"""The way in: which reader a file goes to, and the checks that hold for every scene."""
+"""`read_scene`: selects the reader for a file and checks the scene that it returns."""
 
 import importlib
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, o
 from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, SMALLEST_EXTENT
 from vpltune.renderer.scene.scene import Scene
 
-# Modules by name, so that an OBJ is read without loading Draco.
+# Module and function for each suffix. Modules are loaded on demand, so reading an OBJ does not load Draco.
 _READERS = {
     ".gltf": ("gltf_scene", "read_gltf"),
     ".glb": ("gltf_scene", "read_gltf"),
@@ -23,16 +23,16 @@ _READERS = {
 def read_scene(path: str | Path) -> Scene:
     """Read a scene from a .gltf, .glb, .obj or .ply file.
 
-    Files that the scene refers to are looked for in its own folder only; nothing is fetched. What
-    is left out or approximated is said in `Scene.warnings`, a line each.
+    Files that the scene refers to must be in its folder or below; nothing is fetched. `Scene.warnings` has a
+    line for each thing that is ignored or approximated.
 
     Raises:
-        InputError: the file cannot be read right; one line names the file and the cause.
+        InputError: the file is invalid, unsupported or too large; one line names the file and the cause.
     """
     path = Path(path)
     try:
         read = _reader_for(path)
-        # Every value that counts is tested for being finite; overflow on the way there is no event.
+        # The readers check results for being finite, so overflow on the way needs no warning.
         with np.errstate(all="ignore"):
             scene = read(path, Warnings())
             _check_whole(scene)
@@ -46,7 +46,7 @@ def read_scene(path: str | Path) -> Scene:
 def _reader_for(path: Path) -> Callable[[Path, Warnings], Scene]:
     suffix = path.suffix.lower()
     if suffix == ".xml":
-        raise SceneFileError("Mitsuba XML is not read; turn it into a .glb with `vpltune import`")
+        raise SceneFileError("Mitsuba XML is not read directly; convert it to a .glb with `vpltune import`")
     if suffix not in _READERS:
         raise SceneFileError(f"a scene must be one of {', '.join(_READERS)}, got {suffix or 'no suffix'!r}")
     module, function = _READERS[suffix]

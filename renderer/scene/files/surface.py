@@ -1,4 +1,4 @@
-"""Triangles made fit to be lit: none without area, none out of range, a unit normal at every corner."""
+"""Conversion of triangles from a file to a valid mesh: no zero areas, finite positions and unit normals."""
 
 from dataclasses import dataclass, replace
 
@@ -10,37 +10,44 @@ from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, DecodedBytes
 from vpltune.renderer.scene.scene import Mesh
 from vpltune.renderer.scene.scene_animation import Skinning
 
-# Triangles at a time: bounds the float64 temporaries of a large mesh to about 100 MiB.
+# A choice: triangles processed at a time. It keeps float64 temporaries of a large mesh below about 100 MiB.
 _CHUNK = 1 << 19
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Indexed triangles as a file gives them; absent attributes are None."""
+    """Indexed triangles as in the file. Absent attributes are None."""
 
     positions: Float32[np.ndarray, "vertices 3"]
     triangles: Int64[np.ndarray, "triangles 3"]
     normals: Float32[np.ndarray, "vertices 3"] | None = None
-    """Any length; zero where there is none."""
+    """Any length; zero means that the vertex has no normal."""
     uv: Float32[np.ndarray, "vertices 2"] | None = None
     colors: Float32[np.ndarray, "vertices 3"] | None = None
-    """Linear."""
+    """Linear, in [0, 1]."""
     skinning: Skinning | None = None
 
 
 def finished_mesh(
     surface: Surface, name: str, material: int, decoded: DecodedBytes, where: str
 ) -> Mesh | None:
-    """The mesh of a surface: triangles of zero area go, normals become unit length or flat.
+    """The mesh of a surface, without triangles of zero area and with unit normals.
 
-    Vertices are shared where the file brings normals, and unshared for flat shading, as glTF 2.0
-    section 3.7.2.1 asks. A corner whose normal is zero takes its triangle's.
+    With normals in the file, vertices stay shared. Without them, shading is flat and no vertices are shared,
+    as glTF 2.0 section 3.7.2.1 requires. A corner with a zero normal gets the normal of its triangle.
+
+    Args:
+        surface: the triangles.
+        name: of the mesh.
+        material: index into the scene's materials.
+        decoded: the memory limit.
+        where: the place in the file, for messages.
 
     Returns:
-        None where no triangle has area.
+        None if no triangle has area.
 
     Raises:
-        SceneFileError: a coordinate is not finite or absurdly large, or memory runs over the limit.
+        SceneFileError: a coordinate is not finite or too large, or the memory limit is exceeded.
     """
     for values, what, largest in (
         (surface.positions, "positions", LARGEST_COORDINATE),
@@ -61,7 +68,7 @@ def finished_mesh(
     vertices = len(surface.positions)
     decoded.spend(vertices * (24 + 8 * (surface.uv is not None) + 12 * (surface.colors is not None)), where)
     decoded.spend(12 * len(surface.triangles), where)
-    # One row seen as many where the file has none: most scenes have no vertex colours.
+    # Absent attributes are one broadcast row: most scenes have no vertex colours.
     uv = np.broadcast_to(np.zeros(2, np.float32), (vertices, 2)) if surface.uv is None else surface.uv
     colors = (
         np.broadcast_to(np.ones(3, np.float32), (vertices, 3)) if surface.colors is None else surface.colors
@@ -75,8 +82,8 @@ def finished_mesh(
 def used_vertices(
     corners: Int64[np.ndarray, " corners"], vertex_count: int
 ) -> tuple[Int64[np.ndarray, " used"], Int64[np.ndarray, " corners"]]:
-    """Which of `vertex_count` vertices are referred to, rising, and the corners renumbered to them."""
-    # A scene's primitives may all index one large vertex buffer: cost must follow the corners then.
+    """The indices of used vertices in ascending order, and the corners as indices into them."""
+    # Many primitives may share one large vertex buffer, so for few corners the cost must not depend on it.
     if len(corners) < vertex_count // 16:
         used, renumbered = np.unique(corners, return_inverse=True)
         return used, renumbered.astype(np.int64)
@@ -88,14 +95,14 @@ def used_vertices(
 def _face_normals(
     positions: Float32[np.ndarray, "vertices 3"], triangles: Int64[np.ndarray, "triangles 3"]
 ) -> tuple[Float32[np.ndarray, "triangles 3"], Bool[np.ndarray, " triangles"]]:
-    """Unit normals by winding, and which triangles have area (the others' normals are zero)."""
+    """Unit normals from the winding, and which triangles have area. Normals of the others are zero."""
     normals = np.zeros((len(triangles), 3), np.float32)
     has_area = np.zeros(len(triangles), bool)
     for start in range(0, len(triangles), _CHUNK):
         chunk = slice(start, start + _CHUNK)
         first, second, third = (positions[triangles[chunk, i]].astype(np.float64) for i in range(3))
         (ax, ay, az), (bx, by, bz) = (second - first).T, (third - first).T
-        # Written out: np.cross costs more than all the rest for a primitive of a few triangles.
+        # Written out because np.cross dominates the cost for primitives of a few triangles.
         cross = np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
         length = np.sqrt(np.einsum("ij,ij->i", cross, cross))
         has_area[chunk] = length > 0.0
@@ -119,7 +126,7 @@ def _smooth(
     lacking = ~has_normal[surface.triangles]
     if not lacking.any():
         return surface, normals
-    # A vertex of its own for each corner that must take its triangle's normal.
+    # Each corner that gets its triangle's normal needs its own vertex.
     triangle, corner = np.nonzero(lacking)
     sources = np.concatenate([np.arange(len(normals)), surface.triangles[triangle, corner]])
     triangles = surface.triangles.copy()
@@ -133,7 +140,7 @@ def _smooth(
 def unit_rows(
     rows: Float64[np.ndarray, "n 3"],
 ) -> tuple[Float32[np.ndarray, "n 3"], Bool[np.ndarray, " n"]]:
-    """The rows at unit length, and which of them are longer than zero (the others stay zero)."""
+    """The rows scaled to unit length, and which of them are not zero. Zero rows stay zero."""
     length = np.linalg.norm(rows, axis=1, keepdims=True)
     unit = np.divide(rows, length, out=np.zeros_like(rows), where=length > 0.0)
     return unit.astype(np.float32), length[:, 0] > 0.0
@@ -147,7 +154,7 @@ def _without_unused_vertices(surface: Surface) -> Surface:
 
 
 def _gathered(surface: Surface, rows: Int64[np.ndarray, " rows"]) -> Surface:
-    """The surface with vertex i taken from old vertex rows[i]; triangles are left as they were."""
+    """The surface whose vertex i is the old vertex rows[i]. The triangles are unchanged."""
     return Surface(
         surface.positions[rows],
         surface.triangles,

@@ -1,9 +1,9 @@
-"""Mitsuba's emitters as punctual lights of the same radiant flux, as near as those can come.
+"""Mitsuba's emitters approximated by punctual lights of the same radiant flux.
 
-An area emitter of radiance L and area A sends out π·A·L from one side, as the cosine of the angle to its
-normal. Spots with a cone of 90° fall off as cos² (KHR_lights_punctual, an inner angle of 0), and cos² adds up
-to 2π/3 over the hemisphere: a spot of 3/2·A·L along the axis carries the same flux, a little more of it
-forwards. An emitter that faces no one way, such as a sphere, becomes a point of A·L/4.
+A one-sided area emitter of radiance L and area A emits the flux π·A·L with a cosine distribution. A spot with
+an outer cone of 90° and an inner cone of 0 falls off as cos² (KHR_lights_punctual), which integrates to 2π/3
+over the hemisphere. So a spot of intensity 3/2·A·L has the same flux, slightly more concentrated along the
+normal. An emitter that faces all directions, such as a sphere, becomes a point light of intensity A·L/4.
 """
 
 import math
@@ -20,36 +20,44 @@ from vpltune.renderer.scene.files.scene_folder import SceneFolder
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
 from vpltune.renderer.scene.scene import Light
 
-# An emitter faces one way where its triangles' normals, weighted by area, add up to this share of the area.
+# A choice: an emitter faces one direction if the vector sum of its triangles' areas is at least this share
+# of its area.
 _FACES_ONE_WAY = 0.9
-# How far before its surface a spot stands, of the surface's size: past the rounding of its own plane.
+# A choice: distance of a spot from its emitting surface in units of √area, enough to clear rounding.
 _LIFT = 1e-3
-# Half angle of the part of an environment that one directional light stands for.
+# A choice: half angle of the part of an environment that becomes one directional light, radians.
 _SUN_CONE = math.radians(30.0)
+# A choice: rows of the coarse map in which the brightest part of an environment is searched; 7.5° each.
 _COARSE_ROWS = 24
+# A choice: most lights kept.
 MOST_LIGHTS = 8
+# A choice: the weakest lights are left out if together they carry at most this share of the total flux.
 _LEAST_SHARE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
 class AreaEmitter:
-    """Where an emitting shape is, and what it sends out."""
+    """The punctual light that replaces an emitting shape."""
 
     light: Light
     flux: float
-    """Mean over the channels [W]."""
+    """Radiant flux in W, mean of the channels."""
     hides_itself: bool
-    """Whether its own surface would stand around the light."""
+    """Whether the shape's own surface encloses the light, and so must be removed."""
 
 
 def area_emitter(
     emitter: Plugin, corners_world: Float64[np.ndarray, "triangles 3 3"], outwards: float
 ) -> AreaEmitter | None:
-    """The light in place of an area emitter; None where it sends out nothing.
+    """The punctual light that replaces an area emitter; None if the emitter is black or has no area.
 
     Args:
-        corners_world: of the emitting shape's triangles.
-        outwards: 1 where light leaves on the side that winds counter-clockwise, −1 on the other.
+        emitter: the plugin, whose `radiance` is in W/(m²·sr).
+        corners_world: corners of the shape's triangles in world units.
+        outwards: 1 if light leaves the side on which the triangles wind counter-clockwise, −1 for the other.
+
+    Raises:
+        SceneFileError: the radiance is textured or not a colour.
     """
     radiance = _radiance(emitter)
     vectors = np.cross(
@@ -77,10 +85,19 @@ def area_emitter(
 def punctual_light(
     emitter: Plugin, folder: SceneFolder, extent: float, warnings: Warnings
 ) -> tuple[Light, float] | None:
-    """The light for an emitter that is no shape, and its flux into a scene `extent` across; None without one.
+    """The punctual light for an emitter that is not a shape, and its flux in W, mean of the channels.
+
+    Args:
+        emitter: the plugin.
+        folder: the folder from which an environment map is read.
+        extent: diagonal of the scene in world units, for the flux of directional lights.
+        warnings: takes a line for each approximation.
+
+    Returns:
+        None if the emitter is black or no punctual light can represent it.
 
     Raises:
-        SceneFileError: the type is not known here, or a file cannot be read.
+        SceneFileError: the emitter type is unsupported, a value is invalid, or a file cannot be read.
     """
     across = math.pi * (extent / 2.0) ** 2
     match emitter.type:
@@ -97,16 +114,24 @@ def punctual_light(
             return _environment(emitter, folder, across, warnings)
         case "constant":
             warnings.add(
-                "the constant environment comes from all sides alike: no punctual light can stand for it"
+                "the constant environment is ignored: it lights from all directions, which no punctual light "
+                "can represent"
             )
             return None
         case _:
-            raise SceneFileError(f"{emitter.where}: emitters of this type are not read")
+            raise SceneFileError(f"{emitter.where}: unsupported emitter type")
     return (light, flux) if light.intensity.any() else None
 
 
 def strongest(lights: list[tuple[Light, float]], warnings: Warnings) -> tuple[Light, ...]:
-    """The lights that matter: at most `MOST_LIGHTS`, and without the last 1 % of all flux."""
+    """At most `MOST_LIGHTS` of the strongest lights, without the weakest that carry 1 % of the flux.
+
+    The order of the lights is kept.
+
+    Args:
+        lights: each with its flux in W.
+        warnings: takes a line if lights are left out.
+    """
     order = sorted(range(len(lights)), key=lambda i: -lights[i][1])
     total = sum(flux for _, flux in lights)
     kept: list[int] = []
@@ -126,7 +151,7 @@ def strongest(lights: list[tuple[Light, float]], warnings: Warnings) -> tuple[Li
 
 def _radiance(emitter: Plugin) -> Float64[np.ndarray, "3"]:
     if emitter.child("radiance") is not None:
-        raise SceneFileError(f"{emitter.where}: a textured radiance is not read")
+        raise SceneFileError(f"{emitter.where}: a textured radiance is not supported")
     return emitter.vector("radiance", (1.0, 1.0, 1.0))
 
 
@@ -141,12 +166,12 @@ def _spot(emitter: Plugin, warnings: Warnings) -> tuple[Light, float]:
     inner = math.radians(emitter.number("beam_width", math.degrees(outer) * 0.75))
     if not 0.0 <= inner < outer <= math.pi / 2.0:
         raise SceneFileError(
-            f"{emitter.where}: must have 0 ≤ beam_width < cutoff_angle ≤ 90, "
+            f"{emitter.where}: must have 0 ≤ beam_width < cutoff_angle ≤ 90 degrees, "
             f"got {math.degrees(inner):g} and {math.degrees(outer):g}"
         )
     warnings.tally(
-        "1 spot's light fades between its two angles as glTF has it, not linearly with the angle",
-        "{n} spots' light fades between their two angles as glTF has it, not linearly with the angle",
+        "1 spot falls off between its two angles as in glTF, not linearly with the angle as in Mitsuba",
+        "{n} spots fall off between their two angles as in glTF, not linearly with the angle as in Mitsuba",
     )
     to_world = emitter.to_world()
     intensity = emitter.vector("intensity", (1.0, 1.0, 1.0))
@@ -167,15 +192,15 @@ def _directional(emitter: Plugin) -> Light:
 def _environment(
     emitter: Plugin, folder: SceneFolder, across: float, warnings: Warnings
 ) -> tuple[Light, float] | None:
-    """A directional light for the brightest part of the environment, with the light vector of that part.
+    """A directional light with the light vector of the brightest part of the environment.
 
-    The light vector (Gershun 1939) is the net flux through a surface square to it. That of the whole
-    environment would point up between a low sun and the sky, where rooms have their ceilings.
+    The light vector (Gershun 1939) is the net irradiance through a surface perpendicular to it. That of the
+    whole environment would point between a low sun and the zenith, where rooms have ceilings.
     """
     name = emitter.text("filename")
     content = folder.read(name, emitter.where)
     if not name.lower().endswith(".exr"):
-        warnings.add(f"the environment {name!r:.80} is left out: only .exr is read")
+        warnings.add(f"the environment {name!r:.80} is ignored: only .exr images are supported")
         return None
     pixels = _exr_pixels(content, f"{emitter.where}: {name!r:.80}") * emitter.number("scale", 1.0)
     directions, flux = _coarse_sky(pixels)
@@ -186,17 +211,20 @@ def _environment(
     total = float(flux.sum(axis=0).mean())
     brightest = int(strength.argmax())
     share = float(strength[brightest]) / total if total > 0.0 else 0.0
-    # A cone's share of an even environment, and a half more: what falls short of it comes from all sides.
+    # No main direction: the brightest cone has less than 1.5 times its share of a uniform environment.
     if share < 1.5 * (1.0 - math.cos(_SUN_CONE)) / 2.0:
-        warnings.add(f"the environment {name!r:.80} comes from all sides: no punctual light can stand for it")
+        warnings.add(
+            f"the environment {name!r:.80} is ignored: it lights from all directions, which no punctual "
+            "light can represent"
+        )
         return None
     towards = vectors[brightest].mean(axis=1)
     unit = towards / np.linalg.norm(towards)
     irradiance = np.maximum(unit @ vectors[brightest], 0.0)
     direction = _unit(-(emitter.to_world()[:3, :3] @ unit), emitter)
     warnings.add(
-        f"the environment {name!r:.80} becomes one directional light for its brightest "
-        f"{math.degrees(2 * _SUN_CONE):.0f}°, {share:.0%} of its light"
+        f"the environment {name!r:.80} becomes one directional light, which represents its brightest "
+        f"{math.degrees(2 * _SUN_CONE):.0f}° and {share:.0%} of its light"
     )
     light = Light("directional", irradiance, direction_world=direction, name="environment")
     return light, across * float(irradiance.mean())
@@ -205,12 +233,12 @@ def _environment(
 def _coarse_sky(
     pixels: Float64[np.ndarray, "rows columns 3"],
 ) -> tuple[Float64[np.ndarray, "cells 3"], Float64[np.ndarray, "cells 3"]]:
-    """Directions of the cells of a coarse map, and the radiance in each times its solid angle."""
+    """Unit directions of the cells of a coarse map, and the integral of radiance over each cell."""
     rows, columns, _ = pixels.shape
     azimuth = 2.0 * np.pi * (np.arange(columns) + 0.5) / columns
     polar = np.pi * (np.arange(rows) + 0.5) / rows
     weighted = pixels * (2.0 * np.pi / columns * np.pi / rows * np.sin(polar)[:, None, None])
-    # Mitsuba: azimuth counts from −Z towards +X, the polar angle from +Y.
+    # Mitsuba measures azimuth from −Z towards +X, and the polar angle from +Y.
     sine, cosine = np.sin(polar)[:, None], np.cos(polar)[:, None]
     directions = np.stack(
         np.broadcast_arrays(sine * np.sin(azimuth), cosine, -sine * np.cos(azimuth)), axis=-1
@@ -230,23 +258,23 @@ def _coarse_sky(
 
 
 def _exr_pixels(content: bytes, where: str) -> Float64[np.ndarray, "height width 3"]:
-    # The library reads by name only.
+    # OpenEXR can only read from a file.
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "environment.exr"
         copy.write_bytes(content)
         try:
             channels = OpenEXR.File(str(copy)).channels()
-        except Exception as error:  # of many kinds, none of them the library's own
-            raise SceneFileError(f"{where}: is no OpenEXR image ({error})") from error
+        except Exception as error:  # OpenEXR raises many types, none of its own
+            raise SceneFileError(f"{where}: is not an OpenEXR image ({error})") from error
         if "RGB" in channels or "RGBA" in channels:
             pixels = (channels.get("RGB") or channels["RGBA"]).pixels[..., :3]
         elif all(name in channels for name in "RGB"):
             pixels = np.stack([channels[name].pixels for name in "RGB"], axis=-1)
         else:
-            raise SceneFileError(f"{where}: has no channels R, G and B")
+            raise SceneFileError(f"{where}: must have channels R, G and B, got {', '.join(sorted(channels))}")
         pixels = pixels.astype(np.float64)
     if not (np.isfinite(pixels).all() and (pixels >= 0.0).all()):
-        raise SceneFileError(f"{where}: radiance must be finite and not negative")
+        raise SceneFileError(f"{where}: radiance must be finite and ≥ 0")
     return pixels
 
 

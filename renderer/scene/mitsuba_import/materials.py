@@ -1,4 +1,4 @@
-"""The diffuse part of Mitsuba's materials: what a surface reflects evenly in all directions."""
+"""The diffuse part of Mitsuba's materials."""
 
 from dataclasses import dataclass
 
@@ -12,8 +12,11 @@ from vpltune.renderer.scene.files.scene_folder import SceneFolder
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
 from vpltune.renderer.scene.scene import Material, Texture, Wrap
 
+# Mitsuba's wrap modes.
 _WRAPS: dict[str, Wrap] = {"repeat": "repeat", "mirror": "mirrored_repeat", "clamp": "clamp_to_edge"}
+# Materials that modify the material inside them, which is used in their place.
 _WRAPPERS = ("twosided", "mask", "bumpmap", "normalmap", "bump", "coating", "roughcoating")
+# The parameter of each material type that holds its diffuse reflectance.
 _DIFFUSE_NAMES = {
     "diffuse": "reflectance",
     "roughdiffuse": "reflectance",
@@ -24,8 +27,9 @@ _DIFFUSE_NAMES = {
     "principled": "base_color",
     "principledthin": "base_color",
 }
+# Materials without a diffuse part; their surfaces are removed.
 _GLASS = ("dielectric", "thindielectric", "roughdielectric", "null")
-# Reflectance at normal incidence, linear Rec. 709.
+# Reflectance of metals at normal incidence, linear Rec. 709.
 _METALS = {
     "none": (1.0, 1.0, 1.0),
     "Ag": (0.96, 0.95, 0.92),
@@ -34,19 +38,22 @@ _METALS = {
     "Cr": (0.55, 0.56, 0.55),
     "Cu": (0.93, 0.72, 0.50),
 }
+# A choice: side of a checkerboard image in texels. Bilinear filtering blurs its edges by one texel.
 _CHECKER_TEXELS = 64
 
 
 @dataclass(frozen=True, eq=False)
 class Surfacing:
-    """A material of the scene, and what its texture asks of the mesh's coordinates."""
+    """A material, and the transform of texture coordinates that its texture asks for."""
 
     material: int
+    """Index into the scene's materials."""
     to_uv: Float64[np.ndarray, "3 3"]
+    """Affine transform of homogeneous (u, v, 1)."""
 
 
 class MaterialReader:
-    """Collects materials and textures, each once."""
+    """Converts materials and textures, each once, and collects them in `materials` and `textures`."""
 
     def __init__(self, folder: SceneFolder, warnings: Warnings):
         self.materials: list[Material] = []
@@ -59,15 +66,18 @@ class MaterialReader:
         self._kept: list[Plugin] = []
 
     def surfacing(self, bsdf: Plugin | None) -> Surfacing | None:
-        """What stands for a material; None where its surface must be left out.
+        """The diffuse material for a BSDF; None if surfaces with it must be removed.
+
+        Args:
+            bsdf: the plugin; None stands for Mitsuba's default, a grey of 0.5.
 
         Raises:
-            SceneFileError: the type is not known here, or a texture cannot be read.
+            SceneFileError: the material or texture type is unsupported, or a texture cannot be read.
         """
         if bsdf is None:
             bsdf = Plugin("bsdf", "diffuse", "a shape without a material")
         if id(bsdf) not in self._made:
-            self._kept.append(bsdf)  # no other may take its id
+            self._kept.append(bsdf)  # keep the object alive, so that its id stays unique
             self._made[id(bsdf)] = self._diffuse_part(bsdf)
         return self._made[id(bsdf)]
 
@@ -77,24 +87,24 @@ class MaterialReader:
             return self._inner(bsdf)
         if bsdf.type in _GLASS:
             self._warnings.tally(
-                "1 material is glass or empty: its surfaces are left out",
-                "{n} materials are glass or empty: their surfaces are left out",
+                "1 material is glass or empty: its surfaces are removed",
+                "{n} materials are glass or empty: their surfaces are removed",
             )
             return None
         if bsdf.type in ("conductor", "roughconductor"):
             self._warnings.tally(
-                "1 metal is drawn matt, with its reflectance at normal incidence",
-                "{n} metals are drawn matt, with their reflectance at normal incidence",
+                "1 metal is drawn as diffuse, with its reflectance at normal incidence",
+                "{n} metals are drawn as diffuse, with their reflectance at normal incidence",
             )
             return self._add(name, self._metal(bsdf), None)
         if bsdf.type in ("blendbsdf", "mixturebsdf"):
             return self._blend(bsdf)
         if bsdf.type not in _DIFFUSE_NAMES:
-            raise SceneFileError(f"{bsdf.where}: materials of this type are not read")
+            raise SceneFileError(f"{bsdf.where}: unsupported material type")
         if bsdf.type not in ("diffuse", "roughdiffuse"):
             self._warnings.tally(
-                "1 material has gloss, which is left out: its diffuse part stays",
-                "{n} materials have gloss, which is left out: their diffuse parts stay",
+                "1 material has gloss, which is ignored; its diffuse part is kept",
+                "{n} materials have gloss, which is ignored; their diffuse parts are kept",
             )
         key = _DIFFUSE_NAMES[bsdf.type]
         texture = bsdf.child(key)
@@ -105,34 +115,32 @@ class MaterialReader:
     def _inner(self, bsdf: Plugin) -> Surfacing | None:
         inner = bsdf.of_kind("bsdf")
         if not inner:
-            raise SceneFileError(f"{bsdf.where}: has no material within")
+            raise SceneFileError(f"{bsdf.where}: must contain a material")
         if bsdf.type == "mask":
             self._warnings.tally(
-                "1 cut-out material is drawn whole: its opacity is left out",
-                "{n} cut-out materials are drawn whole: their opacity is left out",
+                "1 cut-out material is drawn opaque: its mask is ignored",
+                "{n} cut-out materials are drawn opaque: their masks are ignored",
             )
         elif bsdf.type != "twosided":
-            self._warnings.add(f"{bsdf.type}: bumps and coats are left out; the material beneath stays")
+            self._warnings.add(f"{bsdf.type}: bumps and coatings are ignored; the material beneath is used")
         return self.surfacing(inner[0])
 
     def _metal(self, bsdf: Plugin) -> Float64[np.ndarray, "3"]:
         tint = bsdf.vector("specular_reflectance", (1.0, 1.0, 1.0))
         if "eta" in bsdf.values or "k" in bsdf.values:
             eta, k = bsdf.vector("eta", (0.0, 0.0, 0.0)), bsdf.vector("k", (1.0, 1.0, 1.0))
-            # Fresnel at normal incidence, against air.
+            # Fresnel reflectance of a conductor at normal incidence in air.
             return tint * ((eta - 1.0) ** 2 + k**2) / ((eta + 1.0) ** 2 + k**2)
         metal = bsdf.text("material", "none")
         if metal not in _METALS:
-            self._warnings.add(
-                f"metal {label(metal, '?')}: its colour is not known here, grey of 0.6 is taken"
-            )
+            self._warnings.add(f"metal {label(metal, '?')} is unknown: a grey reflectance of 0.6 is used")
         return tint * np.array(_METALS.get(metal, (0.6, 0.6, 0.6)))
 
     def _blend(self, bsdf: Plugin) -> Surfacing | None:
         inner = bsdf.of_kind("bsdf")
         if not inner:
-            raise SceneFileError(f"{bsdf.where}: has no material within")
-        self._warnings.add(f"{bsdf.type}: of several materials, the heaviest stands for all")
+            raise SceneFileError(f"{bsdf.where}: must contain a material")
+        self._warnings.add(f"{bsdf.type}: only the material with the largest weight is used")
         heavier = 1 if len(inner) > 1 and bsdf.number("weight", 0.5) > 0.5 else 0
         return self.surfacing(inner[heavier])
 
@@ -140,17 +148,17 @@ class MaterialReader:
         if texture.type == "scale":
             within = texture.of_kind("texture")
             if not within:
-                raise SceneFileError(f"{texture.where}: has no texture within")
+                raise SceneFileError(f"{texture.where}: must contain a texture")
             return self._textured(name, within[0], factor * texture.vector("scale", (1.0, 1.0, 1.0)))
         to_uv = _to_uv(texture)
         if texture.type == "checkerboard":
             return self._add(name, factor, self._checkerboard(texture), to_uv)
         if texture.type != "bitmap":
-            raise SceneFileError(
-                f"{texture.where}: textures of this type are not read; bitmap and checkerboard are"
-            )
+            raise SceneFileError(f"{texture.where}: unsupported texture type; must be bitmap or checkerboard")
         if texture.text("filter_type", "bilinear") == "nearest":
-            self._warnings.add("textures are looked up smoothly, where the scene asks for the nearest texel")
+            self._warnings.add(
+                "textures are filtered bilinearly, although the scene asks for nearest filtering"
+            )
         wrap = texture.text("wrap_mode", "repeat")
         if wrap not in _WRAPS:
             raise SceneFileError(
@@ -189,14 +197,14 @@ class MaterialReader:
         to_uv: Float64[np.ndarray, "3 3"] | None = None,
     ) -> Surfacing:
         if (base_color > 1.0).any():
-            self._warnings.add("reflectances above 1 are drawn as 1")
+            self._warnings.add("reflectances above 1 are clamped to 1")
         color = np.clip(base_color, 0.0, 1.0).astype(np.float32)
         self.materials.append(Material(f"{name} {len(self.materials)}", color, texture))
         return Surfacing(len(self.materials) - 1, np.eye(3) if to_uv is None else to_uv)
 
 
 def _to_uv(texture: Plugin) -> Float64[np.ndarray, "3 3"]:
-    """The affine map of texture coordinates: a transform, or the scales and offsets of version 0.x."""
+    """The affine transform of texture coordinates: a `to_uv`, or the scales and offsets of version 0.x."""
     if "to_uv" in texture.values:
         matrix = texture.to_world("to_uv")
         return matrix[np.ix_((0, 1, 3), (0, 1, 3))]

@@ -19,17 +19,18 @@ from vpltune.renderer.scene.mitsuba_import.shapes import Shape, shape_triangles
 from vpltune.renderer.scene.mitsuba_import.xml_tree import parse_xml
 from vpltune.renderer.scene.scene import Camera, Instance, Light, Mesh, Scene, transform_points, without_scale
 
-# What decides how Mitsuba computes, and not what is there.
+# Top-level plugins that do not affect the imported scene, or only through others: no warning for these.
 _SILENT = ("integrator", "sampler", "film", "rfilter", "bsdf", "texture")
 
 
 def read_mitsuba(path: str | Path) -> Scene:
-    """Read a Mitsuba XML scene of version 0.5 to 3; `Scene.warnings` say what is approximated or left out.
+    """Read a Mitsuba XML scene of version 0.5 to 3.
 
-    Lengths and radiometric values are taken as they stand; files are looked for beside the scene or below.
+    Lengths and radiometric values keep their numbers. Files that the scene refers to must be in its folder or
+    below. `Scene.warnings` lists what is approximated or ignored.
 
     Raises:
-        InputError: the file cannot be read right; one line names the file, the line in it and the cause.
+        InputError: the scene is invalid or unsupported. The message is one line with file, line and cause.
     """
     path = Path(path)
     try:
@@ -81,10 +82,10 @@ class _Import:
             found = punctual_light(emitter, self.folder, extent, self.warnings)
             if found is not None:
                 self.lights.append(found)
-        self._say_unread(root)
+        self._warn_unread(root)
         cameras = tuple(camera for sensor in root.of_kind("sensor") if (camera := self._camera(sensor)))
         if not self.lights:
-            self.warnings.add("no light could be brought over: give one, or let `vpltune fit` place it")
+            self.warnings.add("no light could be imported: add one, or let `vpltune fit` place one")
         return replace(
             scene,
             lights=strongest(self.lights, self.warnings),
@@ -93,10 +94,10 @@ class _Import:
         )
 
     def _mesh(self, plugin: Plugin) -> tuple[int, Float64[np.ndarray, "4 4"]] | None:
-        """Number of the shape's mesh, and where it stands; None where no surface is left."""
+        """Index of the shape's mesh and its transform to world; None if no surface is left."""
         shape = shape_triangles(plugin, self.path, self.folder, self.warnings)
         to_world = plugin.to_world() @ shape.to_shape
-        hidden = self._emit(plugin, shape, to_world)
+        hidden = self._add_area_light(plugin, shape, to_world)
         surfacing = self.materials.surfacing(next(iter(plugin.of_kind("bsdf")), None))
         if surfacing is None or hidden:
             return None
@@ -114,8 +115,8 @@ class _Import:
         name = Path(plugin.text("filename", plugin.type)).stem
         return finished_mesh(surface, name, surfacing.material, self.decoded, plugin.where)
 
-    def _emit(self, plugin: Plugin, shape: Shape, to_world: Float64[np.ndarray, "4 4"]) -> bool:
-        """Add the light of an emitting shape; whether its surface must go, lest it stand around the light."""
+    def _add_area_light(self, plugin: Plugin, shape: Shape, to_world: Float64[np.ndarray, "4 4"]) -> bool:
+        """Add the light of an emitting shape. True if its surface encloses the light and must be removed."""
         emitters = plugin.of_kind("emitter")
         if not emitters:
             return False
@@ -123,7 +124,7 @@ class _Import:
         corners = transform_points(to_world, surface.positions)[surface.triangles]
         outwards = -1.0 if plugin.flag("flip_normals", False) else 1.0
         if plugin.type not in ("obj", "ply", "cube") and np.linalg.det(to_world[:3, :3]) < 0.0:
-            # Mitsuba carries an analytic shape's normal along; a mesh's comes from its mirrored triangles.
+            # Mitsuba transforms normals of analytic shapes; those of meshes follow the mirrored winding.
             outwards = -outwards
         found = area_emitter(emitters[0], corners, outwards)
         if found is None:
@@ -131,14 +132,17 @@ class _Import:
         kind = found.light.kind
         if kind == "spot":
             self.warnings.tally(
-                "1 area emitter becomes a spot of its flux at its centre, along its normal, falling as cos²",
-                "{n} area emitters become spots of their flux at their centres, along their normals, falling "
-                "as cos²",
+                "1 area emitter becomes a spot of the same flux at its centre, along its normal, with a cos² "
+                "falloff",
+                "{n} area emitters become spots of the same flux at their centres, along their normals, with "
+                "a cos² falloff",
             )
         else:
             self.warnings.tally(
-                "1 round area emitter becomes a point of its flux at its centre, and its surface goes",
-                "{n} round area emitters become points of their flux at their centres; their surfaces go",
+                "1 area emitter that faces all directions becomes a point light of the same flux at its "
+                "centre; its surface is removed",
+                "{n} area emitters that face all directions become point lights of the same flux at their "
+                "centres; their surfaces are removed",
             )
         self.lights.append((found.light, found.flux))
         return found.hides_itself
@@ -146,40 +150,43 @@ class _Import:
     def _place_group(self, plugin: Plugin) -> None:
         for group in plugin.of_kind("shape"):
             if id(group) not in self.groups:
-                raise SceneFileError(f"{plugin.where}: must refer to a shapegroup that stands before it")
+                raise SceneFileError(f"{plugin.where}: must refer to a shapegroup defined before it")
             for mesh, to_group in self.groups[id(group)]:
                 self.instances.append(Instance(f"instance {mesh}", mesh, plugin.to_world() @ to_group))
 
     def _camera(self, sensor: Plugin) -> Camera | None:
         if sensor.type not in ("perspective", "thinlens"):
-            self.warnings.add(f"sensor '{sensor.type}' is left out: only perspective ones are brought over")
+            self.warnings.add(f"sensor '{sensor.type}' is ignored: only perspective cameras are imported")
             return None
         if sensor.type == "thinlens":
-            self.warnings.add("the camera's depth of field is left out")
+            self.warnings.add("the camera's depth of field is ignored")
         film = next(iter(sensor.of_kind("film")), None)
         width = film.number("width", 768.0) if film else 768.0
         height = film.number("height", 576.0) if film else 576.0
         if not (width >= 1.0 and height >= 1.0):
-            raise SceneFileError(f"{sensor.where}: its film must have a width and a height of at least 1")
+            raise SceneFileError(
+                f"{sensor.where}: width and height of the film must be at least 1, "
+                f"got {width:g} and {height:g}"
+            )
         matrix = sensor.to_world()
         if np.linalg.det(matrix[:3, :3]) < 0.0:
-            self.warnings.add("the camera's image is mirrored in Mitsuba, and is not here")
-        # Mitsuba looks along +Z with +X to the left.
+            self.warnings.add("Mitsuba mirrors the camera's image; here it is not mirrored")
+        # Mitsuba's camera looks along +Z with +X to the left, ours along −Z with +X to the right.
         rigid = without_scale(matrix @ np.diag([-1.0, 1.0, -1.0, 1.0]))
         if rigid is None:
-            raise SceneFileError(f"{sensor.where}: its transform leaves it no direction")
+            raise SceneFileError(f"{sensor.where}: to_world must keep the view direction and +Y independent")
         return Camera(rigid, _vertical_angle(sensor, width, height))
 
-    def _say_unread(self, root: Plugin) -> None:
+    def _warn_unread(self, root: Plugin) -> None:
         if any(plugin.of_kind("medium") for plugin in root.of_kind("shape")) or root.of_kind("medium"):
-            self.warnings.add("participating media are left out")
+            self.warnings.add("participating media are ignored")
         for _, plugin in root.children:
             if plugin.kind not in (*_SILENT, "shape", "emitter", "sensor", "medium"):
-                self.warnings.add(f"{plugin.where}: is left out")
+                self.warnings.add(f"{plugin.where} is ignored")
 
 
 def _vertical_angle(sensor: Plugin, width: float, height: float) -> float:
-    """Full vertical angle of view, from `fov` along `fov_axis`, or from the focal length on 35 mm film."""
+    """Full vertical field of view in radians, from `fov` and `fov_axis` or the focal length on 35 mm film."""
     axis = sensor.text("fov_axis", "x")
     if "fov" in sensor.values:
         angle = math.radians(sensor.number("fov", 0.0))

@@ -1,4 +1,4 @@
-"""Mitsuba's XML as a tree of plugins: names of either version, defaults put in, references followed."""
+"""Mitsuba's XML as a tree of plugins: defaults substituted, references resolved, names in snake_case."""
 
 import re
 from dataclasses import dataclass, field
@@ -11,6 +11,7 @@ from vpltune.renderer.scene.mitsuba_import.transforms import Matrix, transform
 from vpltune.renderer.scene.mitsuba_import.values import attribute, color, numbers, vector
 from vpltune.renderer.scene.mitsuba_import.xml_tree import XmlNode
 
+# Tags of elements that are plugins; all others are values or declarations.
 _OBJECTS = frozenset(
     (
         "bsdf", "emitter", "film", "integrator", "medium", "phase", "rfilter", "sampler", "scene", "sensor",
@@ -19,52 +20,68 @@ _OBJECTS = frozenset(
 )  # fmt: skip
 Value = float | bool | str | np.ndarray
 V = TypeVar("V")
+"""Type of a plugin's value."""
 
 
 @dataclass(eq=False)
 class Plugin:
-    """One object of the scene."""
+    """A Mitsuba plugin with its values and children.
+
+    The getters return a value by its snake_case name, or `absent` if it is not given. They raise
+    SceneFileError if the value has another type.
+    """
 
     kind: str
-    """Its tag: shape, bsdf, emitter …"""
+    """The tag: shape, bsdf, emitter …"""
     type: str
+    """The attribute `type`: sphere, diffuse, area …"""
     where: str
+    """Line, tag and type, for messages."""
     values: dict[str, Value] = field(default_factory=dict)
-    """Numbers, flags, texts, vectors and colours (3), transforms (4 × 4), by snake_case name."""
+    """Numbers, booleans, strings, vectors and colours [3] and transforms [4, 4], by snake_case name."""
     children: list[tuple[str, "Plugin"]] = field(default_factory=list)
-    """Objects within or referred to, each with the name it has here, or an empty one."""
+    """Nested or referenced plugins, each with its snake_case name, or an empty one."""
 
     def number(self, name: str, absent: float) -> float:
+        """A number."""
         return float(self._value(name, float, "a number", absent))
 
     def flag(self, name: str, absent: bool) -> bool:
+        """A boolean."""
         return self._value(name, bool, "a boolean", absent)
 
     def text(self, name: str, absent: str | None = None) -> str:
-        """Raises SceneFileError where it is missing and nothing stands in for it."""
+        """A string. It is required if `absent` is None.
+
+        Raises:
+            SceneFileError: the string is missing and required, or the value has another type.
+        """
         if absent is None and name not in self.values:
             raise SceneFileError(f"{self.where}: '{name}' is missing")
         return self._value(name, str, "a string", absent or "")
 
     def vector(self, name: str, absent: tuple[float, float, float]) -> np.ndarray:
+        """Three numbers [3]: a point, vector or colour. A single number counts for all three."""
         value = self._value(name, object, "", np.array(absent))
         if isinstance(value, float):
             return np.full(3, value)
         if not isinstance(value, np.ndarray) or value.shape != (3,):
-            raise SceneFileError(f"{self.where}: '{name}' must be three numbers or one")
+            raise SceneFileError(f"{self.where}: '{name}' must be one number or three")
         return value
 
     def to_world(self, name: str = "to_world") -> Matrix:
+        """A transform [4, 4], the identity if it is not given."""
         value = self._value(name, object, "", np.eye(4))
         if not isinstance(value, np.ndarray) or value.shape != (4, 4):
             raise SceneFileError(f"{self.where}: '{name}' must be a transform")
         return value
 
     def child(self, *names: str) -> "Plugin | None":
-        """The first object here under one of `names`."""
+        """The first child with one of `names`, or None."""
         return next((plugin for name, plugin in self.children if name in names), None)
 
     def of_kind(self, kind: str) -> "list[Plugin]":
+        """All children of a kind, in document order."""
         return [plugin for _, plugin in self.children if plugin.kind == kind]
 
     def _value(self, name: str, kind: type[V], expected: str, absent: V) -> V:
@@ -75,13 +92,14 @@ class Plugin:
 
 
 def plugin_tree(root: XmlNode) -> Plugin:
-    """The scene that the document describes.
+    """The plugin of the root element <scene>, with everything below it.
 
     Raises:
-        SceneFileError: an element is unknown, lacks an attribute or has a bad value, or a name is unknown.
+        SceneFileError: an element is unknown, lacks an attribute or has an invalid value, or a reference or a
+            default is undefined.
     """
     if root.tag != "scene":
-        raise SceneFileError(f"{root.where}: a Mitsuba scene's outermost element is <scene>")
+        raise SceneFileError(f"{root.where}: the root element of a Mitsuba scene must be <scene>")
     return _Reader().plugin(root)
 
 
@@ -94,7 +112,7 @@ class _Reader:
         kind = label(attribute(node, "type"), "?") if node.tag != "scene" else "scene"
         made = Plugin(node.tag, kind, f"line {node.line}: {node.tag} '{kind}'")
         for child in node.children:
-            self._put_in(child)
+            self._substitute_defaults(child)
             self._read_into(made, child)
         if "id" in node.attributes:
             self._named[node.attributes["id"]] = made
@@ -116,11 +134,11 @@ class _Reader:
 
     def _referred(self, node: XmlNode, name: str) -> Plugin:
         if name not in self._named:
-            raise SceneFileError(f"{node.where}: nothing before it has the id {name!r:.60}")
+            raise SceneFileError(f"{node.where}: no object with the id {name!r:.60} is defined before it")
         return self._named[name]
 
-    def _put_in(self, node: XmlNode) -> None:
-        """Put defaults in place of their $names, here and in a transform's steps."""
+    def _substitute_defaults(self, node: XmlNode) -> None:
+        """Replace each $name by its default, in the attributes of a node and of a transform's steps."""
         for key, text in node.attributes.items():
             for name in re.findall(r"\$(\w+)", text):
                 if name not in self._defaults:
@@ -129,7 +147,7 @@ class _Reader:
             node.attributes[key] = text
         if node.tag == "transform":
             for step in node.children:
-                self._put_in(step)
+                self._substitute_defaults(step)
 
 
 def _value(node: XmlNode) -> Value:
@@ -150,10 +168,10 @@ def _value(node: XmlNode) -> Value:
         case "transform":
             return transform(node)
         case "blackbody":
-            raise SceneFileError(f"{node.where}: temperatures are not read; give an <rgb>")
-    raise SceneFileError(f"{node.where}: such an element is not known here")
+            raise SceneFileError(f"{node.where}: blackbody temperatures are not supported; use an <rgb>")
+    raise SceneFileError(f"{node.where}: unknown element")
 
 
 def _snake_case(name: str) -> str:
-    """Names of version 0.x in the form of version 2 and later: toWorld is to_world."""
+    """Names from version 0.x as version 2 and later write them: toWorld becomes to_world."""
     return re.sub(r"(?<=[a-z0-9])([A-Z])", lambda match: "_" + match.group(1).lower(), name)

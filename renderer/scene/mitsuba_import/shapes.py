@@ -1,4 +1,4 @@
-"""Mitsuba's shapes as triangles, in their own space."""
+"""Mitsuba's shapes as triangles in local space."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -15,32 +15,37 @@ from vpltune.renderer.scene.files.surface import Surface
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
 from vpltune.renderer.scene.scene import Mesh
 
-# Chords cut 0.1 % off a circle of so many sides, and a sphere of half as many rings.
+# A choice: segments of a circle, and twice the rings of a sphere. 80 segments lose 0.1 % of a circle's area.
 _SIDES = 80
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Triangles, and the transform that the shape's own parameters add before `to_world`."""
+    """Triangles, and the transform from the shape's parameters that is applied before `to_world`."""
 
     surface: Surface
     to_shape: Float64[np.ndarray, "4 4"]
+    """Such as the centre and radius of a sphere; the identity if there are none."""
 
 
 def shape_triangles(shape: Plugin, path: Path, folder: SceneFolder, warnings: Warnings) -> Shape:
-    """The triangles of a shape; files that it names lie beside the scene file `path`, or below.
+    """The triangles of a shape. The origin of texture coordinates is at the top left, as in Mitsuba and glTF.
 
-    Texture coordinates have their origin at the top left, as Mitsuba's and glTF's have.
+    Args:
+        shape: the plugin.
+        path: the scene file; mesh files must be in its folder or below.
+        folder: that folder.
+        warnings: takes a line for each approximation.
 
     Raises:
-        SceneFileError: the type is not known here, or its file cannot be read.
+        SceneFileError: the shape type is unsupported, a value is invalid, or a mesh file cannot be read.
     """
     if shape.type in ("obj", "ply"):
         return Shape(_from_file(shape, path, folder, warnings), np.eye(4))
     make = _ANALYTIC.get(shape.type)
     if make is None:
         known = ", ".join(("obj", "ply", *_ANALYTIC))
-        raise SceneFileError(f"{shape.where}: shapes of this type are not read; known are {known}")
+        raise SceneFileError(f"{shape.where}: unsupported shape type; must be one of {known}")
     made = make(shape)
     if shape.flag("face_normals", False):
         made = replace(made, surface=replace(made.surface, normals=None))
@@ -50,7 +55,7 @@ def shape_triangles(shape: Plugin, path: Path, folder: SceneFolder, warnings: Wa
 def _from_file(shape: Plugin, path: Path, folder: SceneFolder, warnings: Warnings) -> Surface:
     name = shape.text("filename")
     if not folder.has(name, shape.where):
-        raise SceneFileError(f"{shape.where}: {name!r:.80} is not there")
+        raise SceneFileError(f"{shape.where}: {name!r:.80} does not exist")
     reader = read_obj if shape.type == "obj" else read_ply
     said = Warnings()
     try:
@@ -58,7 +63,7 @@ def _from_file(shape: Plugin, path: Path, folder: SceneFolder, warnings: Warning
     except SceneFileError as error:
         raise SceneFileError(f"{shape.where}: {name!r:.80}: {error}") from error
     for line in scene.warnings:
-        # What the file says of materials does not count: the scene has its own.
+        # Materials in the file are not used: the scene has its own.
         if "material" not in line and "mtl" not in line and "texture" not in line:
             warnings.add(f"{name!r:.80}: {line}")
     meshes = scene.meshes
@@ -66,7 +71,7 @@ def _from_file(shape: Plugin, path: Path, folder: SceneFolder, warnings: Warning
         raise SceneFileError(f"{shape.where}: {name!r:.80} has no triangles")
     surface = _joined(meshes)
     if shape.type == "ply" and surface.uv is not None:
-        # Our reader turns PLY's v over, as most programs that write PLY mean it; Mitsuba does not.
+        # Our PLY reader flips v, as most programs that write PLY expect. Mitsuba does not, so undo it.
         surface = replace(surface, uv=surface.uv * np.float32((1, -1)) + np.float32((0, 1)))
     flipped = shape.flag("flip_tex_coords", shape.type == "obj")
     if flipped != (shape.type == "obj") and surface.uv is not None:
@@ -88,16 +93,16 @@ def _joined(meshes: tuple[Mesh, ...]) -> Surface:
 
 
 def _is_flat(surface: Surface) -> bool:
-    """Whether every corner has its triangle's normal, as our readers give it where a file has none."""
+    """Whether every corner has its triangle's normal, as our readers set it if the file has no normals."""
     return len(surface.positions) == surface.triangles.size and bool(
         (surface.normals[surface.triangles] == surface.normals[surface.triangles[:, :1]]).all()
     )
 
 
 def _smoothed(surface: Surface) -> Surface:
-    """Vertices of one place and texture coordinate joined, with normals weighted by angle.
+    """The surface with equal vertices merged and smooth, angle-weighted normals (Thürmer and Wüthrich 1998).
 
-    Thürmer and Wüthrich 1998, which Mitsuba does to files without normals.
+    Mitsuba does the same for files without normals. Vertices are equal if position and uv are.
     """
     keys = np.concatenate([surface.positions, surface.uv], axis=1)
     _, first, vertex = np.unique(keys, axis=0, return_index=True, return_inverse=True)
@@ -123,7 +128,7 @@ def _rectangle(shape: Plugin) -> Shape:
 
 
 def _cube(shape: Plugin) -> Shape:
-    """Six faces, with the texture coordinates that Mitsuba's cube has."""
+    """The cube [−1, 1]³ with the texture coordinates of Mitsuba's cube."""
     uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float64)
     faces = np.array(
         [
@@ -151,7 +156,7 @@ def _sphere(shape: Plugin) -> Shape:
     uv = np.stack([u, v], axis=-1).reshape(-1, 2)
     to_shape = np.diag([*[shape.number("radius", 1.0)] * 3, 1.0])
     to_shape[:3, 3] = shape.vector("center", (0.0, 0.0, 0.0))
-    # Polar angle runs down, azimuth to the left seen from outside.
+    # Rows go down and columns go left, seen from outside, so reverse the winding.
     return Shape(
         _surface(points, _grid(_SIDES // 2, _SIDES)[:, ::-1], points, uv), _invertible(to_shape, shape)
     )
@@ -167,7 +172,7 @@ def _disk(shape: Plugin) -> Shape:
 
 
 def _cylinder(shape: Plugin) -> Shape:
-    """Open at both ends, from p0 to p1."""
+    """A cylinder from p0 to p1, open at both ends."""
     start, end = shape.vector("p0", (0.0, 0.0, 0.0)), shape.vector("p1", (0.0, 0.0, 1.0))
     turn, height = np.meshgrid(np.arange(_SIDES + 1) / _SIDES, [0.0, 1.0])
     angle = 2.0 * np.pi * turn
@@ -190,12 +195,12 @@ def _cylinder(shape: Plugin) -> Shape:
 
 def _invertible(matrix: Float64[np.ndarray, "4 4"], shape: Plugin) -> Float64[np.ndarray, "4 4"]:
     if not abs(np.linalg.det(matrix[:3, :3])) > 0.0:
-        raise SceneFileError(f"{shape.where}: must have a radius and a length above zero")
+        raise SceneFileError(f"{shape.where}: radius and length must be above zero")
     return matrix
 
 
 def _grid(rows: int, columns: int) -> Int64[np.ndarray, "triangles 3"]:
-    """Two triangles for each cell of a grid of (rows + 1) × (columns + 1) vertices."""
+    """Triangles of a grid of (rows + 1) × (columns + 1) vertices, two for each cell."""
     first = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).reshape(-1, 1)
     up = columns + 1
     return np.concatenate([first + np.array([0, 1, up + 1]), first + np.array([0, up + 1, up])]).astype(

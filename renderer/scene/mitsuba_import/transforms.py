@@ -1,4 +1,4 @@
-"""Mitsuba's <transform>: steps, each applied after those before it."""
+"""Mitsuba's <transform>: a list of steps, applied in order."""
 
 import math
 
@@ -16,7 +16,7 @@ def transform(node: XmlNode) -> Matrix:
     """The matrix of a <transform> element.
 
     Raises:
-        SceneFileError: an unknown step, a number missing or not finite, or a matrix with no inverse.
+        SceneFileError: a step is unknown, a number is missing or not finite, or the matrix is singular.
     """
     matrix = np.eye(4)
     for step in node.children:
@@ -40,7 +40,7 @@ def _scale(step: XmlNode) -> Matrix:
 
 
 def _rotate(step: XmlNode) -> Matrix:
-    """Rodrigues 1840."""
+    """Rotation by `angle` degrees about an axis (Rodrigues 1840)."""
     axis = vector(step, 0.0)
     length = np.linalg.norm(axis)
     if not length > 0.0:
@@ -66,7 +66,7 @@ def _matrix(step: XmlNode) -> Matrix:
 
 
 def _look_at(step: XmlNode) -> Matrix:
-    """Mitsuba looks along +Z with +Y up and +X to the left."""
+    """The matrix that looks from `origin` to `target`: along +Z, with +Y up and +X to the left."""
     origin, target = numbers(step, "origin", 3), numbers(step, "target", 3)
     up = numbers(step, "up", 3) if "up" in step.attributes else np.array([0.0, 1.0, 0.0])
     forward = target - origin

@@ -1,4 +1,4 @@
-"""Numbers, vectors and colours as Mitsuba writes them into attributes."""
+"""Numbers, vectors and colours in the attributes of Mitsuba's XML."""
 
 import math
 import re
@@ -10,16 +10,17 @@ from vpltune.renderer.files.srgb import linear_from_srgb
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
 from vpltune.renderer.scene.mitsuba_import.xml_tree import XmlNode
 
+# A choice: numbers beyond this are rejected, so that sums and products stay finite in float64.
 _LARGEST = 1e30
-# Where the eye's three kinds of cones are most apart: over these, a sampled spectrum is averaged [nm].
+# A choice: wavelength bands in nm over which a sampled spectrum is averaged, for red, green and blue.
 _BANDS = ((580.0, 680.0), (490.0, 580.0), (420.0, 490.0))
 
 
 def attribute(node: XmlNode, key: str) -> str:
-    """A required attribute.
+    """The text of a required attribute.
 
     Raises:
-        SceneFileError: it is missing.
+        SceneFileError: the attribute is missing.
     """
     if key not in node.attributes:
         raise SceneFileError(f"{node.where}: attribute '{key}' is missing")
@@ -30,7 +31,7 @@ def numbers(node: XmlNode, key: str, count: int) -> Float64[np.ndarray, " count"
     """`count` numbers from an attribute, separated by spaces or commas.
 
     Raises:
-        SceneFileError: there are more or fewer, or one is not finite.
+        SceneFileError: the attribute is missing, the count differs, or a number is not finite.
     """
     words = attribute(node, key).replace(",", " ").split()
     try:
@@ -46,7 +47,11 @@ def numbers(node: XmlNode, key: str, count: int) -> Float64[np.ndarray, " count"
 
 
 def vector(node: XmlNode, absent: float) -> Float64[np.ndarray, "3"]:
-    """From `value` (three numbers, or one for all), or from `x`, `y` and `z`; `absent` where not given."""
+    """Three numbers: from `value` (three, or one for all), or from `x`, `y` and `z`, by default `absent`.
+
+    Raises:
+        SceneFileError: a number cannot be read or is not finite.
+    """
     if "value" in node.attributes:
         count = len(node.attributes["value"].replace(",", " ").split())
         return np.broadcast_to(numbers(node, "value", 1 if count == 1 else 3), 3).copy()
@@ -54,10 +59,10 @@ def vector(node: XmlNode, absent: float) -> Float64[np.ndarray, "3"]:
 
 
 def color(node: XmlNode) -> Float64[np.ndarray, "3"]:
-    """Linear red, green and blue of an <rgb>, <srgb> or <spectrum> element.
+    """The linear RGB colour of an <rgb>, <srgb> or <spectrum> element, or of a #rrggbb value.
 
     Raises:
-        SceneFileError: it cannot be read, or is negative.
+        SceneFileError: the colour cannot be read or is negative.
     """
     text = attribute(node, "value").strip()
     if re.fullmatch(r"#[0-9a-fA-F]{6}", text):
@@ -81,6 +86,6 @@ def _sampled_spectrum(node: XmlNode, text: str) -> Float64[np.ndarray, "3"]:
     except ValueError:
         pairs = np.full((1, 2), math.nan)
     if pairs.ndim != 2 or pairs.shape[1] != 2 or not (np.abs(pairs) <= _LARGEST).all():
-        raise SceneFileError(f"{node.where}: a spectrum is wavelength:value pairs, got {text!r:.60}")
+        raise SceneFileError(f"{node.where}: a spectrum must be wavelength:value pairs, got {text!r:.60}")
     pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
     return np.array([np.interp(np.linspace(*band, 16), pairs[:, 0], pairs[:, 1]).mean() for band in _BANDS])

@@ -1,17 +1,19 @@
-"""XML read without its dangers: no document type, so no entities to expand and nothing to fetch."""
+"""A safe XML parser: document types are rejected, so there are no entities to expand and nothing to fetch."""
 
 import xml.parsers.expat
 from dataclasses import dataclass, field
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, label
 
+# A choice: most elements of a document, far above those of real scenes.
 _MOST_NODES = 1_000_000
+# A choice: deepest nesting of elements, far above that of real scenes.
 _DEEPEST = 64
 
 
 @dataclass(eq=False)
 class XmlNode:
-    """One element; its text is not kept, since Mitsuba's elements have none."""
+    """An XML element. Its text is dropped, since Mitsuba's elements have none."""
 
     tag: str
     attributes: dict[str, str]
@@ -20,14 +22,16 @@ class XmlNode:
 
     @property
     def where(self) -> str:
+        """Line and tag, for messages."""
         return f"line {self.line}: <{label(self.tag, '?')}>"
 
 
 def parse_xml(content: bytes) -> XmlNode:
-    """The document's root.
+    """The root element of a document.
 
     Raises:
-        SceneFileError: not well-formed, a document type is declared, or there are too many elements.
+        SceneFileError: the document is not well-formed XML, declares a document type, has too many elements
+            or nests them too deep.
     """
     builder = _TreeBuilder()
     try:
@@ -54,9 +58,9 @@ class _TreeBuilder:
         node = XmlNode(tag, attributes, self.parser.CurrentLineNumber)
         self._count += 1
         if self._count > _MOST_NODES:
-            raise SceneFileError(f"{node.where}: a scene has at most {_MOST_NODES:,} elements")
+            raise SceneFileError(f"{node.where}: a scene must have at most {_MOST_NODES:,} elements")
         if len(self._open) >= _DEEPEST:
-            raise SceneFileError(f"{node.where}: elements stand at most {_DEEPEST} deep in each other")
+            raise SceneFileError(f"{node.where}: elements must be nested at most {_DEEPEST} deep")
         if self._open:
             self._open[-1].children.append(node)
         else:
@@ -69,5 +73,5 @@ class _TreeBuilder:
     def _refuse_doctype(self, name: str, *_: object) -> None:
         line = self.parser.CurrentLineNumber
         raise SceneFileError(
-            f"line {line}: <!DOCTYPE {label(name, '?')}>: a scene must declare no document type"
+            f"line {line}: <!DOCTYPE {label(name, '?')}>: a scene must not declare a document type"
         )

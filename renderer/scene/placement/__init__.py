@@ -1,4 +1,4 @@
-"""Cameras, lights and views for scenes that bring none, and the small file in which a user says otherwise."""
+"""Automatic cameras, lights and views, and the sidecar file in which a user can set camera and lights."""
 
 from vpltune.renderer.scene.placement.automatic_camera import default_camera
 from vpltune.renderer.scene.placement.automatic_light import default_light

@@ -1,7 +1,7 @@
-"""A camera for a scene that has none, chosen by what it sees.
+"""An automatic camera for a scene that has none, chosen by how much it sees.
 
-In a scene that is a room the camera stands inside, or before the open side if there is one. Anything else is
-an object, looked at from outside. Up is +Y, as in glTF.
+In a room, the camera stands inside, or in front of the open side if there is one. Any other scene counts as
+an object, which the camera looks at from outside. Up is +Y, as in glTF.
 """
 
 import math
@@ -21,30 +21,37 @@ from vpltune.renderer.scene.placement.free_space import FreeSpace, free_space, s
 from vpltune.renderer.scene.placement.sight import MIDDLE_RAYS, front_facing, lit_fraction, seen_by
 from vpltune.renderer.scene.scene import Camera, Light, Scene, look_at
 
+# A choice: vertical field of view inside a room, radians.
 YFOV = math.radians(62.0)
+# A choice: vertical field of view of a camera that looks at an object or into an open side, radians.
 OBJECT_YFOV = math.radians(40.0)
+# A choice: number of best views that are scored again with the rays of a whole image.
 FINALISTS = 32
-# A side is open where nearly all rays through it meet a surface, most of them well inside.
+# A choice: a side of a room is open if at least this share of the rays through it hit a surface, at a median
+# depth of at least this share of the room.
 OPENING_HITS, OPENING_DEPTH = 0.95, 0.4
-# What is nearer than this share of the grid's diagonal stands in the way of the view.
+# A choice: a surface nearer than this share of the grid's diagonal obstructs the view.
 NEAR = 0.12
-# Of a given light's reach, more than this share of the image adds nothing.
+# A choice: a camera gains nothing from a directly lit share of the image beyond this.
 ENOUGH_LIT = 0.45
 
 
 def default_camera(scene: Scene) -> tuple[Camera, str]:
-    """A camera that shows much of the scene, and a sentence that says where it stands and why."""
+    """A camera that shows much of the scene, and a sentence that says where it stands and why.
+
+    The choice depends on the scene only, and not on its scale.
+    """
     candidates, where = _cameras(free_space(scene))
     camera = max(candidates, key=lambda candidate: candidate[0])[1]
     return camera, _camera_note(camera, where)
 
 
 def default_camera_for_lights(scene: Scene, lights: tuple[Light, ...]) -> tuple[Camera, str]:
-    """As `default_camera`, but of the good views the one that sees most of what these lights light."""
+    """Like `default_camera`, but also prefers views in which these lights light much of the image."""
     space = free_space(scene)
     candidates, where = _cameras(space)
     shares = [lit_fraction(space, seen_by(space, camera), lights) for _, camera in candidates]
-    # As good an image at half the lit share counts for as much as half as good an image all lit.
+    # Half the lit share weighs as much as half the score. Rounding keeps ties independent of scene scale.
     scores = [
         round(score * min(share, ENOUGH_LIT), 9) for (score, _), share in zip(candidates, shares, strict=True)
     ]
@@ -56,24 +63,28 @@ def default_camera_for_lights(scene: Scene, lights: tuple[Light, ...]) -> tuple[
 
 def _camera_note(camera: Camera, where: str) -> str:
     eye = ", ".join(f"{coordinate:.4g}" for coordinate in camera.position_world)
-    return f"camera chosen automatically: {where}, at ({eye}), {math.degrees(camera.yfov):.0f}° vertical"
+    degrees = math.degrees(camera.yfov)
+    return (
+        f"camera chosen automatically: {where}, at ({eye}), with a vertical field of view of {degrees:.0f}°"
+    )
 
 
 def _cameras(space: FreeSpace) -> tuple[list[tuple[float, Camera]], str]:
-    """Good cameras with their scores, and in words where they stand."""
+    """Candidate cameras with their scores, and a description of where they stand."""
     if not is_room(space):
-        return _cameras_outside(space), "outside, in a three-quarter view of the whole"
+        return _cameras_outside(space), "outside, in a three-quarter view of the whole scene"
     before_opening = _cameras_before_openings(space)
     if before_opening:
-        return before_opening, "before the open side, looking in"
-    return _cameras_inside(space, free_places(space)), "inside, where much is seen"
+        return before_opening, "in front of the open side, looking in"
+    return _cameras_inside(space, free_places(space)), "inside, where it sees much of the scene"
 
 
 def _cameras_inside(space: FreeSpace, places: Places) -> list[tuple[float, Camera]]:
-    """The best of all level and slightly lowered views from the free places.
+    """The `FINALISTS` best level and slightly lowered views from the free places.
 
-    Wanted: all rays hit, from the front; far and varied depth; nothing close before the lens; a walled-in
-    place; eye height. Each is a factor; the few best are looked at again with a whole image's rays.
+    The score is a product. Its factors favour rays that hit surfaces from the front, large and varied depth,
+    nothing close to the camera, a walled-in place and eye height. The finalists are then scored again with
+    the rays of a whole image.
     """
     looks, inside = _looks()
     count = inside.sum(axis=1)
@@ -85,11 +96,11 @@ def _cameras_inside(space: FreeSpace, places: Places) -> list[tuple[float, Camer
     mean_log = log_depth @ inside.T / hits
     spread = np.sqrt(np.maximum(log_depth**2 @ inside.T / hits - mean_log**2, 0.0))
     diagonal = float(np.linalg.norm(space.shape))
-    # The square root of the area seen, its tilt aside.
+    # The square root of the visible area, if every surface faced the camera.
     reach = np.sqrt(np.where(places.front, depth**2, 0.0) @ inside.T / count) / diagonal
     near = (places.hit & (places.distance < NEAR * diagonal)) @ inside.T / count
-    # A place with the front of a surface all round is in a room; one with a fifth of it open still serves, as
-    # in a box without a front wall.
+    # A place surrounded by front faces is in a room. A fifth of the directions may be open without penalty,
+    # as in a box without a front wall.
     indoors = np.minimum(places.front.mean(axis=1) / 0.8, 1.0) ** 4
     place_weight = indoors * _eye_height_weight(space, places.positions)
     score = (
@@ -111,7 +122,7 @@ def _cameras_inside(space: FreeSpace, places: Places) -> list[tuple[float, Camer
 
 
 def _looks() -> tuple[Float64[np.ndarray, "looks 3"], Float64[np.ndarray, "looks directions"]]:
-    """View directions all round, and which sphere directions (as 0 or 1) lie in the 4:3 image of each."""
+    """View directions all around, and for each a mask (0 or 1) of the sphere directions in its 4:3 image."""
     directions = sphere_directions(PLACE_DIRECTIONS)
     looks, inside = [], []
     for pitch in np.radians([-4.0, -16.0]):
@@ -131,7 +142,7 @@ def _looks() -> tuple[Float64[np.ndarray, "looks 3"], Float64[np.ndarray, "looks
 
 
 def _image_score(space: FreeSpace, camera: Camera) -> float:
-    """How much surface an image shows from its front, at what variety of depths, with nothing in the way."""
+    """Score of an image: visible front-facing area, variety of depth, and nothing in the way."""
     sight = seen_by(space, camera)
     hit = sight.hits.hit
     if not hit.any():
@@ -142,12 +153,12 @@ def _image_score(space: FreeSpace, camera: Camera) -> float:
     distance = sight.hits.distance[hit]
     normals = space.normals.reshape(-1, 3)[sight.hits.voxel[hit]]
     front = front_facing(space, sight.hits.voxel[hit], rays)
-    # Surface per ray is d²/cos θ; the bound on cos θ keeps a floor seen lengthwise from counting for all.
+    # Area per ray is d²/cos θ. The bound on cos θ keeps a floor at a grazing angle from dominating the score.
     tilt = np.maximum(np.abs((normals * rays).sum(axis=1)), 0.3)
     seen = math.sqrt(float(np.where(front, distance**2 / tilt, 0.0).sum()) / hit.size)
     near = float((distance < NEAR * np.linalg.norm(space.shape)).sum()) / hit.size
     spread = float(np.std(np.log(np.maximum(distance, 0.5))))
-    # Into the depth of the room rather than past a corner of it.
+    # Favour a view into the depth of the room over one past a corner.
     middle = sight.hits.distance[MIDDLE_RAYS]
     depth_ahead = float(np.where(np.isfinite(middle), middle, 0.0).mean() / np.median(distance))
     return (
@@ -160,20 +171,20 @@ def _image_score(space: FreeSpace, camera: Camera) -> float:
 
 
 def _eye_height_weight(space: FreeSpace, positions: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, " n"]:
-    """1 from 0.3 to 0.6 of the way from floor to ceiling, falling to 0.3 either side and without a floor."""
+    """1 at heights of 0.3 to 0.6 between floor and ceiling, falling to 0.3 outside; 0.3 without a floor."""
     fraction = height_fraction(space, positions)
     outside = np.maximum(0.3 - fraction, 0.0) + np.maximum(fraction - 0.6, 0.0)
     return np.where(fraction > 0.0, np.maximum(1.0 - 2.0 * outside, 0.3), 0.3)
 
 
 def _cameras_before_openings(space: FreeSpace) -> list[tuple[float, Camera]]:
-    """Level views into a room through open sides, as into a stage or a Cornell box; often none."""
+    """Level views into a room through its open sides, as into a Cornell box; often there are none."""
     occupied = np.argwhere(space.occupied) + 0.5
     low, high = occupied.min(axis=0), occupied.max(axis=0)
     target, extent = 0.5 * (low + high), high - low
     cameras = []
     for axis, across in ((2, 0), (0, 2)):
-        # The open side just fills the image's height or width, whichever is first.
+        # Distance at which the open side fills the image's height or width, whichever it fills first.
         fitting = 0.5 * min(extent[1], extent[across] * 3.0 / 4.0) / math.tan(0.5 * OBJECT_YFOV)
         for side in (1.0, -1.0):
             back = np.zeros(3)
@@ -184,7 +195,7 @@ def _cameras_before_openings(space: FreeSpace) -> list[tuple[float, Camera]]:
             hit = sight.hits.hit
             rays = (sight.points - eye) / np.maximum(sight.hits.distance, 1e-6)[:, None]
             front = hit & front_facing(space, sight.hits.voxel, np.where(hit[:, None], rays, 0.0))
-            # How far in behind the open side, as a share of the way through.
+            # Depth behind the open side, as a share of the room's depth.
             depth = (0.5 * extent[axis] - (sight.points - target) @ back) / extent[axis]
             inward = float(np.median(depth[front])) if front.any() else 0.0
             if hit.mean() > OPENING_HITS and front.mean() > FROM_FRONT and inward > OPENING_DEPTH:
@@ -193,7 +204,7 @@ def _cameras_before_openings(space: FreeSpace) -> list[tuple[float, Camera]]:
 
 
 def _cameras_outside(space: FreeSpace) -> list[tuple[float, Camera]]:
-    """Three-quarter views from all round, framing the bounds."""
+    """Three-quarter views from all around that frame the whole scene."""
     occupied = np.argwhere(space.occupied) + 0.5
     target = 0.5 * (occupied.min(axis=0) + occupied.max(axis=0))
     cameras = []
@@ -209,7 +220,7 @@ def _cameras_outside(space: FreeSpace) -> list[tuple[float, Camera]]:
             rotation = look_at(back, np.zeros(3))[:3, :3]
             local = (occupied - target) @ rotation
             tan_y = math.tan(0.5 * OBJECT_YFOV)
-            # Far enough for every voxel to be in the image: z + |y|/tan and z + |x|/(tan · 4/3).
+            # Far enough for every voxel to be in the image: z + |y|/tan and z + |x|/(tan · 4/3), plus 2 %.
             reach = np.maximum(np.abs(local[:, 1]) / tan_y, np.abs(local[:, 0]) / (tan_y * 4.0 / 3.0))
             distance = 1.02 * float((reach + local[:, 2]).max())
             eye = space.to_world(target + distance * back)

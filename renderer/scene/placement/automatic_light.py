@@ -1,6 +1,6 @@
-"""A spot light for a scene that has none, chosen by what it reaches and what the camera sees of that.
+"""An automatic spot light for a scene that has none, chosen by what it lights and what the camera sees.
 
-In a scene that is a room the light hangs inside, high up; an object is lit from outside. Up is +Y.
+In a room the light hangs high up inside. An object is lit from outside. Up is +Y.
 """
 
 import dataclasses
@@ -28,20 +28,27 @@ from vpltune.renderer.scene.placement.sight import (
 )
 from vpltune.renderer.scene.scene import Camera, Light, Scene
 
-# Half angles, inner and outer.
+# A choice: inner and outer half angle of the spot in a room, radians.
 ROOM_CONE = (math.radians(35.0), math.radians(55.0))
+# A choice: inner and outer half angle of the spot that lights an object, radians.
 OBJECT_CONE = (math.radians(18.0), math.radians(27.0))
+# A choice: directions on the sphere, of which those in the cone are used to score a spot.
 CONE_DIRECTIONS = 512
-# A light is best where this much of the image is lit directly: the rest shows what bounces.
+# A choice: the best share of the image to light directly. The rest shows indirect light.
 BEST_LIT = 0.45
-# What is nearer to a light than this share of the root mean square distance of what it meets burns out.
+# A choice: a surface is overexposed if it is nearer to the light than this share of the RMS distance of all
+# lit surfaces.
 BURNT = 0.45
-# W/m² at the root mean square distance of what the light meets, in each channel.
+# A choice: irradiance in W/m² at the RMS distance of the lit surfaces, in each channel. A white diffuse
+# surface there has a radiance of 1.
 MEAN_IRRADIANCE = math.pi
 
 
 def default_light(scene: Scene, camera: Camera) -> tuple[Light, str]:
-    """A spot light that lights part of what the camera sees, and a sentence that says where and why."""
+    """A spot light that lights part of what the camera sees, and a sentence that says where it is and why.
+
+    The choice depends on the scene and the camera only, and not on the scale of the scene.
+    """
     space = free_space(scene)
     sight = seen_by(space, camera)
     positions, axes, (inner_cone, outer_cone) = _light_candidates(space, camera, sight)
@@ -49,8 +56,8 @@ def default_light(scene: Scene, camera: Camera) -> tuple[Light, str]:
     light = _spot(space, space.to_world(positions[chosen]), axes[chosen, axis], inner_cone, outer_cone)
     place = ", ".join(f"{coordinate:.4g}" for coordinate in light.position_world)
     return light, (
-        f"light chosen automatically: a {2.0 * math.degrees(outer_cone):.0f}° spot at ({place}), which lights"
-        f" {100.0 * lit_share:.0f} % of what the camera sees; the rest shows the indirect light"
+        f"light chosen automatically: a {2.0 * math.degrees(outer_cone):.0f}° spot at ({place}); it lights"
+        f" {100.0 * lit_share:.0f} % of what the camera sees, and the rest shows the indirect light"
     )
 
 
@@ -61,7 +68,7 @@ def _spot(
     inner_cone: float,
     outer_cone: float,
 ) -> Light:
-    """A spot of π W/m² at the root mean square distance of what it meets, whatever the scale of the scene."""
+    """A spot that gives `MEAN_IRRADIANCE` at the RMS distance of the surfaces that it lights."""
     dark = Light(
         "spot", np.zeros(3), position_world, direction_world, inner_cone, outer_cone, "automatic spot"
     )
@@ -72,7 +79,7 @@ def _spot(
 def _light_candidates(
     space: FreeSpace, camera: Camera, sight: Sight
 ) -> tuple[Float64[np.ndarray, "n 3"], Float64[np.ndarray, "n axes 3"], tuple[float, float]]:
-    """Positions (voxel units), the axes to try at each, and the inner and outer cone."""
+    """Positions (voxel units), the axes to try at each, and the inner and outer half angle (radians)."""
     eye = space.to_voxels(camera.position_world)
     seen = sight.points[sight.hits.hit]
     center = np.median(seen, axis=0) if len(seen) else 0.5 * np.array(space.shape, np.float64)
@@ -87,14 +94,14 @@ def _light_candidates(
 
 
 def _tilted(tilt: float, azimuth: float) -> Float64[np.ndarray, "3"]:
-    """A direction `tilt` away from straight down."""
+    """The unit vector at the angle `tilt` from straight down (radians)."""
     return np.array([math.sin(tilt) * math.cos(azimuth), -math.cos(tilt), math.sin(tilt) * math.sin(azimuth)])
 
 
 def _places_in_view(
     space: FreeSpace, eye: Float64[np.ndarray, "3"], center: Float64[np.ndarray, "3"]
 ) -> Float64[np.ndarray, "n 3"]:
-    """Free places in sight of the eye, the nearest to what it sees, high up in the room if it can be."""
+    """Free places visible from the eye and near to what it sees, high up in the room if possible."""
     index = np.argwhere(space.clearance >= CLEARANCE)
     positions = index[:: max(1, -(-len(index) // (2 * PLACES)))] + 0.5
     offset = positions - eye
@@ -114,7 +121,7 @@ def _places_in_view(
 def _places_around(
     space: FreeSpace, eye: Float64[np.ndarray, "3"], center: Float64[np.ndarray, "3"]
 ) -> Float64[np.ndarray, "n 3"]:
-    """Places outside an object: above it, to either side of the camera's view, as far away as it is long."""
+    """Places outside and above an object, to both sides of the camera's view, 0.8 grid diagonals away."""
     reach = 0.8 * float(np.linalg.norm(space.shape))
     back = eye - center
     azimuth = math.atan2(back[0], back[2])
@@ -142,10 +149,10 @@ def _best_spot(
     axes: Float64[np.ndarray, "n axes 3"],
     outer_cone: float,
 ) -> tuple[int, int, float]:
-    """Index of position and axis of the best spot, and the share of the image that it lights.
+    """Indices of the best spot's position and axis, and the share of the image that it lights.
 
-    Wanted: the cone meets surfaces; none of them is close by, which would burn out; and part of the image
-    is lit, its middle rather than its rim, and part not.
+    The score is a product. Its factors favour a cone that hits surfaces, none of them so close that they are
+    overexposed, a directly lit share of the image near `BEST_LIT`, and a lit middle of the image.
     """
     directions = sphere_directions(CONE_DIRECTIONS)
     around = marched(space, positions, directions)
@@ -161,7 +168,7 @@ def _best_spot(
     lit_share = _lit_shares(space, seen[::4], positions, axes, outer_cone)
     middle_share = _lit_shares(space, sight.points[in_middle & sight.hits.hit], positions, axes, outer_cone)
     wanted = np.exp(-(((lit_share - BEST_LIT) / 0.2) ** 2))
-    # Every light scores something, so that where none is good the least bad one is taken.
+    # The constants keep every score above zero, so the least bad spot wins if none is good.
     score = (
         (hits / count) ** 2
         * (1.0 - burnt_share) ** 2
@@ -179,7 +186,7 @@ def _lit_shares(
     axes: Float64[np.ndarray, "n axes 3"],
     outer_cone: float,
 ) -> Float64[np.ndarray, "n axes"]:
-    """Share of surface points that a spot at each position, along each of its axes, lights."""
+    """Share of the surface points that a spot lights, for each position and each of its axes."""
     if not len(points):
         return np.zeros(axes.shape[:2])
     offset = points[None, :, :] - positions[:, None, :]

@@ -1,7 +1,7 @@
-"""Where a scene is empty: an occupancy grid of its surfaces, distances in it, and rays marched through it.
+"""Free space of a scene: an occupancy grid of its surfaces, a distance field, and ray marching through it.
 
-All distances are in voxels and all positions in voxel units from the grid's low corner, so a scene and the
-same scene at another scale give the same grid, and whatever is chosen in it is the same choice.
+Distances are in voxels and positions in voxel units from the grid's low corner. The grid of a scaled scene is
+therefore the same, and so is every choice made from it.
 """
 
 import functools
@@ -13,50 +13,60 @@ from jaxtyping import Bool, Float32, Float64, Int64
 
 from vpltune.renderer.scene.scene import Scene, transform_points
 
+# A choice: number of voxels in the scene's bounds.
 VOXEL_BUDGET = 64**3
+# A choice: most voxels along the longest side. An elongated scene gets fewer voxels because of it.
 LONGEST_SIDE = 128
-# Empty voxels round the scene's bounds. The odd fraction keeps surfaces that lie on round fractions of the
-# bounds off the voxel faces.
+# A choice: empty voxels around the scene's bounds. The odd fraction keeps surfaces at round fractions of the
+# bounds away from voxel faces.
 MARGIN = 2.37
-# Samples of one grid; triangle soups with more get a coarser grid. 2²⁴ points are about a second.
+# Most surface samples of one grid; scenes that would need more get a coarser grid. 2²⁴ samples take about a
+# second.
 SAMPLE_BUDGET = 2**24
+# A choice: samples processed at a time, to bound memory.
 SAMPLE_CHUNK = 2**20
-# In voxels. A voxel can be missed only where a triangle cuts off a corner of it smaller than this.
+# Largest distance between samples in voxels. They can only miss a voxel whose corner is clipped by less.
 SAMPLE_SPACING = 0.3
-# Voxel coordinates are rounded here: far above double rounding at any scale of the scene, far below a voxel.
+# Voxel coordinates are rounded to this many decimals: coarser than double rounding at any scene scale, and
+# much finer than a voxel. Scenes at different scales then give the same grid.
 DECIMALS = 5
-# No march step is shorter: half a voxel cannot jump over a surface one voxel thick, corners grazed aside.
+# Shortest march step in voxels. Half a voxel cannot jump over a surface one voxel thick, except at a corner.
 SHORTEST_STEP = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class FreeSpace:
-    """A cubic voxel grid over a scene."""
+    """A grid of cubic voxels around a scene."""
 
     low_world: Float64[np.ndarray, "3"]
+    """Low corner of the grid in world units."""
     voxel_world: float
     """Edge of a voxel in world units."""
     occupied: Bool[np.ndarray, "nx ny nz"]
+    """Whether a surface passes through the voxel."""
     clearance: Float32[np.ndarray, "nx ny nz"]
-    """Voxels from this voxel's centre to the nearest occupied one's centre."""
+    """Distance in voxels from the voxel's centre to the centre of the nearest occupied voxel."""
     area: Float32[np.ndarray, "nx ny nz"]
-    """Surface in the voxel, in squared voxels."""
+    """Surface area in the voxel, in squared voxels."""
     normals: Float32[np.ndarray, "nx ny nz 3"]
-    """Area-weighted mean of the front-face normals in the voxel, length up to 1; 0 where faces oppose."""
+    """Area-weighted mean of the front-face normals in the voxel. Length 0 (opposing faces cancel) to 1."""
 
     def to_world(self, positions: Float64[np.ndarray, "*n 3"]) -> Float64[np.ndarray, "*n 3"]:
+        """World positions from positions in voxel units."""
         return self.low_world + positions * self.voxel_world
 
     def to_voxels(self, positions_world: Float64[np.ndarray, "*n 3"]) -> Float64[np.ndarray, "*n 3"]:
+        """Positions in voxel units, rounded to `DECIMALS`, from world positions."""
         return np.round((positions_world - self.low_world) / self.voxel_world, DECIMALS)
 
     @property
     def shape(self) -> tuple[int, int, int]:
+        """Number of voxels along x, y and z."""
         x, y, z = self.occupied.shape
         return x, y, z
 
     def clearance_at(self, positions: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, " n"]:
-        """Clearance at positions in voxel units; outside the grid, the distance to the grid on top."""
+        """Clearance at positions in voxel units. Outside the grid, the distance to the grid is added."""
         limit = np.array(self.shape) - 1
         index = np.clip(np.floor(positions).astype(np.int64), 0, limit)
         outside = np.linalg.norm(positions - np.clip(positions, 0.0, limit + 1.0), axis=1)
@@ -65,22 +75,22 @@ class FreeSpace:
 
 @dataclass(frozen=True, eq=False)
 class RayHits:
-    """What rays met. Where `hit` is false the ray left the grid, and distance is infinite, voxel −1."""
+    """The first hits of rays. A ray without a hit left the grid."""
 
     hit: Bool[np.ndarray, "*rays"]
     distance: Float64[np.ndarray, "*rays"]
-    """In voxels."""
+    """Distance in voxels; infinite without a hit."""
     voxel: Int64[np.ndarray, "*rays"]
-    """Flat index of the voxel hit."""
+    """Flat index of the voxel hit; −1 without a hit."""
 
 
 @functools.lru_cache(maxsize=1)
 def free_space(scene: Scene) -> FreeSpace:
-    """The occupancy grid of a scene, kept for the scene last asked for: scenes are never altered."""
+    """The occupancy grid of a scene. The grid of the last scene is cached; scenes are immutable."""
     low, high = scene.bounds()
     extent = high - low
     size = float(extent.max()) or 1.0
-    # A flat scene is at least 1/64 as thick as it is long, or its voxels would shrink with its thickness.
+    # Treat a flat scene as at least 1/64 as thick as it is long. Otherwise the voxels would shrink with it.
     volume = float(np.prod(np.maximum(extent / size, 1.0 / 64.0)))
     relative_voxel = max((volume / VOXEL_BUDGET) ** (1.0 / 3.0), 1.0 / LONGEST_SIDE)
     triangles = _triangles_world(scene)
@@ -96,7 +106,7 @@ def free_space(scene: Scene) -> FreeSpace:
 
 
 def _triangles_world(scene: Scene) -> Float64[np.ndarray, "triangles 3 3"]:
-    """Corners of all placed triangles, the longest edge first; mirrored instances keep their front faces."""
+    """Corners of all placed triangles, longest edge first. Mirrored instances keep their front faces."""
     placed = []
     for instance in scene.instances:
         mesh = scene.meshes[instance.mesh]
@@ -104,7 +114,7 @@ def _triangles_world(scene: Scene) -> Float64[np.ndarray, "triangles 3 3"]:
         placed.append(corners[:, ::-1] if np.linalg.det(instance.to_world[:3, :3]) < 0.0 else corners)
     corners = np.concatenate(placed) if placed else np.zeros((0, 3, 3))
     edges = np.linalg.norm(corners[:, [1, 2, 0]] - corners, axis=2)
-    # Rounded, so that which of several equal edges is taken does not hang on the scene's scale.
+    # Rounded so that the choice between equal edges does not depend on the scene's scale.
     relative = edges / np.maximum(edges.max(axis=1, keepdims=True), np.finfo(np.float64).tiny)
     first = np.round(relative, 6).argmax(axis=1)
     order = (first[:, None] + np.arange(3)) % 3
@@ -114,7 +124,7 @@ def _triangles_world(scene: Scene) -> Float64[np.ndarray, "triangles 3 3"]:
 def _sample_counts(
     triangles: Float64[np.ndarray, "triangles 3 3"], voxel: float
 ) -> Int64[np.ndarray, "triangles 2"]:
-    """Samples along the longest edge and across it, at most 0.3 voxels apart."""
+    """Number of samples along the longest edge and across it, at most `SAMPLE_SPACING` apart."""
     edge = triangles[:, 1] - triangles[:, 0]
     length = np.linalg.norm(edge, axis=1)
     twice_area = np.linalg.norm(np.cross(edge, triangles[:, 2] - triangles[:, 0]), axis=1)
@@ -126,7 +136,7 @@ def _sample_counts(
 def _surface_samples(
     triangles: Float64[np.ndarray, "triangles 3 3"], voxel: float
 ) -> Iterator[tuple[Int64[np.ndarray, " n"], Float64[np.ndarray, "n 3"], Float64[np.ndarray, " n"]]]:
-    """Lattice points in rows along each longest edge: triangle, position, share of the triangle's area."""
+    """Sample points in rows along each longest edge: triangle, position, share of the triangle's area."""
     counts = _sample_counts(triangles, voxel)
     per_triangle = counts.prod(axis=1)
     ends = np.cumsum(per_triangle)
@@ -140,7 +150,7 @@ def _surface_samples(
         t = (within // along) / np.maximum(across - 1, 1)
         a, b, c = triangles[triangle].transpose(1, 0, 2)
         base = a + s[:, None] * (b - a)
-        # Rows narrow towards the apex, and their samples' shares with them; all shares add up to 1.
+        # Rows get narrower towards the apex, and so do the shares of their samples. The shares add up to 1.
         share = 2.0 * (1.0 - t + 0.5 / across) / ((along * (across + 1)).astype(np.float64))
         yield triangle, base + t[:, None] * (c - base), share
 
@@ -151,7 +161,7 @@ def _rasterised(
     voxel: float,
     shape: Int64[np.ndarray, "3"],
 ) -> tuple[Float32[np.ndarray, "nx ny nz"], Float32[np.ndarray, "nx ny nz 3"]]:
-    """Area and mean front-face normal in each voxel; a voxel is touched where its area is positive."""
+    """Area and mean front-face normal in each voxel. A voxel is occupied if its area is positive."""
     cells = int(shape.prod())
     touched = np.zeros(cells)
     area = np.zeros(cells)
@@ -167,18 +177,18 @@ def _rasterised(
         area += np.bincount(flat, weights=share * triangle_area[triangle], minlength=cells)
         for axis in range(3):
             normal_sum[axis] += np.bincount(flat, share * area_vector[triangle, axis], minlength=cells)
-    # A degenerate triangle has no area and yet something is there: a token area keeps the voxel occupied.
+    # A degenerate triangle has no area; 1e-6 keeps its voxels occupied.
     area = np.where(touched > 0.0, np.maximum(area, 1e-6), 0.0)
     normals = np.round(normal_sum / np.maximum(area, 1e-6), 3).T
     return area.reshape(shape).astype(np.float32), normals.reshape(*shape, 3).astype(np.float32)
 
 
 def _distance_to_occupied(occupied: Bool[np.ndarray, "nx ny nz"]) -> Float32[np.ndarray, "nx ny nz"]:
-    """Exact Euclidean distance transform, one axis after another (Felzenszwalb and Huttenlocher 2012, Eq. 2).
+    """Exact Euclidean distance transform, axis by axis (Felzenszwalb and Huttenlocher 2012, Eq. 2).
 
-    The lower envelope of each line is taken by brute force, n² per line of n: the grid is small.
+    It takes the lower envelope of each line by brute force, n² steps for n voxels, because the grid is small.
     """
-    # Longer than any distance in the grid, and small enough to be exact in float32.
+    # Larger than any squared distance in the grid, and small enough to be exact in float32.
     squared = np.where(occupied, 0.0, 3.0 * (2.0 * LONGEST_SIDE) ** 2).astype(np.float32)
     for axis in range(3):
         lines = np.moveaxis(squared, axis, 0)
@@ -194,7 +204,7 @@ def _distance_to_occupied(occupied: Bool[np.ndarray, "nx ny nz"]) -> Float32[np.
 def marched(
     space: FreeSpace, origins: Float64[np.ndarray, "n 3"], directions: Float64[np.ndarray, "m 3"]
 ) -> RayHits:
-    """March every unit direction from every origin (voxel units); the result has shape [n, m]."""
+    """March rays from every origin (voxel units) along every unit direction; the result has shape [n, m]."""
     pairs = (len(origins), len(directions))
     hits = march_rays(space, np.repeat(origins, pairs[1], axis=0), np.tile(directions, (pairs[0], 1)))
     return RayHits(hits.hit.reshape(pairs), hits.distance.reshape(pairs), hits.voxel.reshape(pairs))
@@ -203,9 +213,14 @@ def marched(
 def march_rays(
     space: FreeSpace, origins: Float64[np.ndarray, "n 3"], directions: Float64[np.ndarray, "n 3"]
 ) -> RayHits:
-    """Sphere-march rays to the first occupied voxel (Hart 1996); an origin may lie outside the grid.
+    """Sphere-trace rays to the first occupied voxel (Hart 1996).
 
-    The distance is exact to about half a voxel. A ray that starts in an occupied voxel hits at distance 0.
+    Distances are accurate to about half a voxel. A ray that starts in an occupied voxel hits at distance 0.
+
+    Args:
+        space: the grid.
+        origins: voxel units, inside or outside the grid.
+        directions: unit vectors.
     """
     upper = np.array(space.shape, np.float64)
     occupied, clearance = space.occupied.ravel(), space.clearance.ravel()
@@ -220,7 +235,7 @@ def march_rays(
         index = np.clip(np.floor(position).astype(np.int64), 0, np.array(space.shape) - 1) @ strides
         arrived = occupied[index]
         distance[active[arrived]], voxel[active[arrived]] = travelled[arrived], index[arrived]
-        # From centre to centre; the position and the surface may each be half a diagonal (√3/2) off theirs.
+        # Clearance is between voxel centres. Position and surface may each be half a diagonal (√3/2) off.
         travelled = travelled + np.maximum(clearance[index] - np.sqrt(3.0), SHORTEST_STEP)
         going = ~arrived & (travelled < leave[active])
         active, travelled = active[going], travelled[going]
@@ -232,17 +247,17 @@ def _span_in_grid(
     directions: Float64[np.ndarray, "n 3"],
     upper: Float64[np.ndarray, "3"],
 ) -> tuple[Float64[np.ndarray, " n"], Float64[np.ndarray, " n"]]:
-    """Where rays enter and leave the box from 0 to `upper` (slab test), entering no earlier than at 0."""
-    # So close to a slab's plane a direction counts as parallel to it; the ray leaves the grid long before.
+    """Distances at which rays enter (0 or more) and leave the box from 0 to `upper`, by the slab test."""
+    # Avoids a division by zero. A ray so nearly parallel to a slab leaves the grid through another one.
     steep = np.where(np.abs(directions) < 1e-9, np.copysign(1e-9, directions), directions)
     to_low, to_high = -origins / steep, (upper - origins) / steep
     enter = np.maximum(np.minimum(to_low, to_high).max(axis=1), 0.0)
-    # No way through is longer than the diagonal; this also ends a ray of direction zero.
+    # No path through the box is longer than its diagonal. This also ends rays whose direction is zero.
     return enter, np.minimum(np.maximum(to_low, to_high).min(axis=1), enter + np.linalg.norm(upper))
 
 
 def sphere_directions(count: int) -> Float64[np.ndarray, "count 3"]:
-    """Directions spread evenly over the sphere: a spherical Fibonacci lattice (Swinbank and Purser 2006)."""
+    """Unit directions spread evenly over the sphere, a Fibonacci lattice (Swinbank and Purser 2006)."""
     k = np.arange(count) + 0.5
     y = 1.0 - 2.0 * k / count
     azimuth = np.pi * (3.0 - np.sqrt(5.0)) * k

@@ -1,6 +1,7 @@
-"""Where camera and lights come from: flags, the small TOML beside the scene, the file, an automatic choice.
+"""Where camera and lights come from: flags, then the sidecar, then the scene file, then an automatic choice.
 
-The sidecar of `room.glb` is `room.vpltune.toml`; lengths in world units, angles in degrees::
+The sidecar is a TOML file beside the scene: `room.vpltune.toml` for `room.glb`. Lengths are in world units,
+angles in degrees::
 
     [camera]
     eye = [3.6, 2.7, -1.7]
@@ -10,7 +11,7 @@ The sidecar of `room.glb` is `room.vpltune.toml`; lengths in world units, angles
     [[light]]
     type = "spot"               # or "point", "directional"
     position = [0.3, 3.3, 0.2]  # not for a directional light
-    look_at = [0.0, 0.0, 0.3]   # or direction = [x, y, z], the way the light travels; not for a point light
+    look_at = [0.0, 0.0, 0.3]   # or direction = [x, y, z], in which the light travels; not for a point light
     intensity = 10.0            # W/sr (spot, point) or W/m² (directional): one number, or red, green, blue
     inner_cone_degrees = 35.0   # half angles, spot only
     outer_cone_degrees = 55.0
@@ -32,28 +33,33 @@ from vpltune.renderer.scene.placement.sight import lit_fraction, seen_by
 from vpltune.renderer.scene.scene import Camera, Light, Scene, look_at
 from vpltune.renderer.scene.views import check_cone
 
+# A choice: vertical field of view if a camera gives none.
 DEFAULT_YFOV_DEGREES = 60.0
+# A choice: half angles if a spot gives none; those of an automatic light in a room.
 DEFAULT_CONE_DEGREES = {"inner_cone_degrees": 35.0, "outer_cone_degrees": 55.0}
+# The keys that a camera may have; any other is rejected.
 CAMERA_KEYS = ("eye", "look_at", "yfov_degrees")
+# The keys that each type of light may have; any other is rejected.
 LIGHT_KEYS = {
     "spot": ("type", "position", "direction", "look_at", "intensity", *DEFAULT_CONE_DEGREES),
     "point": ("type", "position", "intensity"),
     "directional": ("type", "direction", "look_at", "position", "intensity"),
 }
-# A file's lights that reach less of the image than this light nothing that can be seen.
+# A choice: if the scene file's lights reach a smaller share of the image than this, they are replaced.
 LEAST_LIT = 0.005
 
 
 def sidecar_path(scene_path: Path) -> Path:
-    """Where the sidecar of a scene lies, whether or not it exists."""
+    """The path of a scene's sidecar, whether or not the file exists."""
     return Path(scene_path).with_suffix(".vpltune.toml")
 
 
 def read_sidecar(path: Path) -> tuple[Camera | None, tuple[Light, ...] | None]:
-    """The camera and the lights a sidecar gives; None for what it does not mention.
+    """The camera and the lights in a sidecar, each None if the sidecar does not give it.
 
     Raises:
-        InputError: it cannot be read, is not TOML, has an unknown key, or a value that is not as it must be.
+        InputError: the file cannot be read or is not TOML, a key is unknown or missing, or a value is not
+            allowed.
     """
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -77,10 +83,16 @@ def resolve_camera_and_lights(
     camera_override: Camera | None,
     light_override: tuple[Light, ...] | None,
 ) -> tuple[Camera, tuple[Light, ...], tuple[str, ...]]:
-    """The camera and lights to use, and a sentence for each thing that the user did not say in so many words.
+    """The camera and lights to use, and a note for every choice that the caller did not make.
+
+    Args:
+        scene: the scene.
+        scene_path: its file, beside which the sidecar is looked for.
+        camera_override: goes before any other camera.
+        light_override: goes before any other lights.
 
     Raises:
-        InputError: the sidecar is there and cannot be used, or the scene has no surfaces.
+        InputError: the sidecar exists but is invalid, or the scene has no triangles.
     """
     if not scene.triangle_count():
         raise InputError(f"{scene_path}: a scene must have at least one triangle, got none")
@@ -133,7 +145,7 @@ def _numbers(
         raise InputError(f"{where}: key '{key}' is missing")
     value = table[key]
     items = value if isinstance(value, list) else [value]
-    # bool is an int to Python; TOML has inf and nan, and numbers too large for float32 would become them.
+    # TOML has inf and nan, larger numbers overflow float32, and bool is a subclass of int.
     plain = all(isinstance(item, int | float) and not isinstance(item, bool) for item in items)
     if not plain or len(items) not in counts or not all(abs(item) <= 1e30 for item in items):
         wanted = " or ".join(str(count) for count in counts)
@@ -179,7 +191,10 @@ def _direction(
     table: dict[str, Any], position: Float64[np.ndarray, "3"] | None, where: str
 ) -> Float64[np.ndarray, "3"]:
     if ("direction" in table) == ("look_at" in table):
-        raise InputError(f"{where}: give one of 'direction' and 'look_at'")
+        raise InputError(
+            f"{where}: must have either 'direction' or 'look_at', "
+            f"got {'both' if 'look_at' in table else 'neither'}"
+        )
     if "direction" in table:
         direction = _numbers(table, "direction", (3,), where)
     else:

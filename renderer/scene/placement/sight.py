@@ -1,4 +1,4 @@
-"""What a camera sees and what a light reaches, estimated by rays through the occupancy grid."""
+"""What a camera sees and what a light reaches, estimated by ray marching through the occupancy grid."""
 
 import math
 from dataclasses import dataclass
@@ -9,39 +9,41 @@ from jaxtyping import Bool, Float64, Int64
 from vpltune.renderer.scene.placement.free_space import FreeSpace, RayHits, march_rays
 from vpltune.renderer.scene.scene import Camera, Light
 
-# Rays of one image, columns by rows.
+# A choice: rays of one image, columns by rows (4:3).
 IMAGE = (40, 30)
-# The middle third of the image, either way.
+# Flat indices of the rays in the middle third of the image, horizontally and vertically.
 MIDDLE_RAYS = np.arange(IMAGE[0] * IMAGE[1]).reshape(IMAGE[1], IMAGE[0])[10:20, 13:27].ravel()
-# Rays of one light.
+# A choice: rays of one spot or point light. A directional light has four times as many.
 LIGHT_RAYS = 1024
-# Hits this many voxels apart are the same place: a marched distance is good to half a voxel at either end.
+# A choice: hits closer together than this, in voxels, count as the same place. Both ends of a marched
+# distance are accurate to about half a voxel.
 SAME_PLACE = 1.8
-# How far rays are let go that start in a voxel with a surface in it.
+# A choice: distance in voxels that a ray skips first if it starts in an occupied voxel.
 LEAVE_WALL = 1.8
-# The cosine between a ray and a voxel's mean normal above which it surely meets a back face.
+# A choice: a ray hits a back face if the cosine between it and the voxel's mean normal is at least this.
 BACK_FACE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """What the rays of one camera met."""
+    """What the rays of one camera hit."""
 
     hits: RayHits
     points: Float64[np.ndarray, "rays 3"]
-    """Where, in voxel units; meaningless where `hits.hit` is false."""
+    """Hit points in voxel units; undefined where `hits.hit` is false."""
 
     @property
     def hit_fraction(self) -> float:
+        """Share of the rays that hit a surface, in [0, 1]."""
         return float(self.hits.hit.mean())
 
     def depth(self) -> float:
-        """Median distance of what is seen in voxels; 0 where nothing is."""
+        """Median distance of the visible surfaces in voxels; 0 if none is visible."""
         return float(np.median(self.hits.distance[self.hits.hit])) if self.hits.hit.any() else 0.0
 
 
 def image_directions(camera: Camera, columns_rows: tuple[int, int] = IMAGE) -> Float64[np.ndarray, "rays 3"]:
-    """Unit directions through the pixel centres of a coarse image of that many columns and rows."""
+    """Unit directions in world space through the pixel centres of a coarse image, row by row from the top."""
     columns, rows = columns_rows
     tan_half = math.tan(0.5 * camera.yfov)
     x = (2.0 * (np.arange(columns) + 0.5) / columns - 1.0) * tan_half * columns / rows
@@ -52,7 +54,7 @@ def image_directions(camera: Camera, columns_rows: tuple[int, int] = IMAGE) -> F
 
 
 def seen_by(space: FreeSpace, camera: Camera) -> Sight:
-    """What a 4:3 image of this camera shows."""
+    """What the camera sees in a 4:3 image."""
     directions = image_directions(camera)
     origin = space.to_voxels(camera.position_world)
     hits = march_from(space, origin, directions)
@@ -62,7 +64,10 @@ def seen_by(space: FreeSpace, camera: Camera) -> Sight:
 def march_from(
     space: FreeSpace, place: Float64[np.ndarray, "3"], directions: Float64[np.ndarray, "rays 3"]
 ) -> RayHits:
-    """Rays of one eye or lamp; where it shares a voxel with a wall, they start beyond it."""
+    """March rays from one camera or light at `place` (voxel units) along unit directions.
+
+    If the voxel of `place` is occupied, the rays skip the first `LEAVE_WALL` voxels.
+    """
     lead = LEAVE_WALL if space.clearance_at(place[None, :])[0] == 0.0 else 0.0
     hits = march_rays(space, place + lead * directions, directions)
     return RayHits(hits.hit, hits.distance + lead, hits.voxel)
@@ -71,7 +76,7 @@ def march_from(
 def front_facing(
     space: FreeSpace, voxel: Int64[np.ndarray, "*rays"], directions: Float64[np.ndarray, "*rays 3"]
 ) -> Bool[np.ndarray, "*rays"]:
-    """Whether rays meet the front of what is in the voxels hit; where both sides are there, true."""
+    """Whether rays hit front faces in the given voxels. True if a voxel holds faces of both orientations."""
     normals = space.normals.reshape(-1, 3)[voxel]
     return (normals * directions).sum(axis=-1) < BACK_FACE
 
@@ -79,7 +84,13 @@ def front_facing(
 def cone_directions(
     axis: Float64[np.ndarray, "3"], outer_cone: float, count: int
 ) -> Float64[np.ndarray, "count 3"]:
-    """Directions spread evenly over a cone of half angle `outer_cone`, by a Fibonacci lattice on its cap."""
+    """Unit directions spread evenly over a cone, a Fibonacci lattice on its spherical cap.
+
+    Args:
+        axis: unit vector.
+        outer_cone: half angle of the cone in radians.
+        count: number of directions.
+    """
     k = np.arange(count) + 0.5
     cosine = 1.0 - k / count * (1.0 - math.cos(outer_cone))
     azimuth = math.pi * (3.0 - math.sqrt(5.0)) * k
@@ -91,7 +102,7 @@ def cone_directions(
 
 
 def frame_of(axis: Float64[np.ndarray, "3"]) -> tuple[Float64[np.ndarray, "3"], Float64[np.ndarray, "3"]]:
-    """Two unit vectors square to a unit axis and to each other."""
+    """Two unit vectors perpendicular to a unit axis and to each other."""
     helper = np.eye(3)[np.argmin(np.round(np.abs(axis), 6))]
     u = np.cross(axis, helper)
     u /= np.linalg.norm(u)
@@ -99,7 +110,7 @@ def frame_of(axis: Float64[np.ndarray, "3"]) -> tuple[Float64[np.ndarray, "3"], 
 
 
 def light_hits(space: FreeSpace, light: Light) -> RayHits:
-    """What the rays of a light meet first; a directional light's start outside the grid, over all of it."""
+    """The first hits of a light's rays. A directional light's start outside and cover the whole grid."""
     if light.kind == "directional":
         size = float(np.linalg.norm(space.shape))
         u, v = frame_of(light.direction_world)
@@ -114,9 +125,9 @@ def light_hits(space: FreeSpace, light: Light) -> RayHits:
 
 
 def lit(space: FreeSpace, light: Light, points: Float64[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
-    """Which surface points (voxel units, within half a voxel) direct light of this light reaches."""
+    """Which surface points (voxel units, accurate to half a voxel) the light reaches directly."""
     if light.kind == "directional":
-        # Marched from outside the grid, so that a point need not be left first.
+        # March towards the points from outside the grid, so no ray starts on a surface.
         distance = np.full(len(points), 2.0 * float(np.linalg.norm(space.shape)))
         towards = np.tile(light.direction_world, (len(points), 1))
         hits = march_rays(space, points - distance[:, None] * towards, towards)
@@ -133,7 +144,7 @@ def lit(space: FreeSpace, light: Light, points: Float64[np.ndarray, "n 3"]) -> B
 
 
 def lit_fraction(space: FreeSpace, sight: Sight, lights: tuple[Light, ...]) -> float:
-    """Share of an image's surfaces that direct light of any of the lights reaches."""
+    """Share of an image's visible surface points that any of the lights reaches directly, in [0, 1]."""
     points = sight.points[sight.hits.hit]
     if not len(points):
         return 0.0
@@ -143,6 +154,6 @@ def lit_fraction(space: FreeSpace, sight: Sight, lights: tuple[Light, ...]) -> f
 
 
 def mean_square_distance_world(space: FreeSpace, hits: RayHits) -> float:
-    """Mean squared distance of hits, world units squared; 0 where there are none."""
+    """Mean squared distance of the hits in world units squared; 0 if there are none."""
     distance = hits.distance[hits.hit]
     return float((distance**2).mean()) * space.voxel_world**2 if distance.size else 0.0

@@ -1,4 +1,4 @@
-"""Views to fit to and others to hold out: the given camera and lights, and seeded moves of both."""
+"""Fitted, validation and held-out views: the given camera and lights, and seeded random moves of both."""
 
 import dataclasses
 import math
@@ -19,27 +19,29 @@ from vpltune.renderer.scene.placement.sight import (
 from vpltune.renderer.scene.scene import Camera, Light, Scene, look_at
 from vpltune.renderer.scene.views import Split, View
 
-# A camera moves by up to this share of the median depth that it sees, a light of its root mean square reach.
+# Choices: a camera moves by up to this share of the median depth it sees, a light by up to this share of the
+# RMS distance of what it lights.
 CAMERA_MOVE, LIGHT_MOVE = 0.25, 0.3
-# What it looks at moves by up to this share of the same length.
+# A choice: the point that a camera or light aims at moves by up to this share of the same length.
 TARGET_MOVE = 0.15
-# A directional light turns by up to this.
+# A choice: a directional light turns by up to this angle, radians.
 SUN_TURN = math.radians(25.0)
-# No move is shorter than this share of the longest, so that no two views are the same.
+# A choice: the shortest move as a share of the longest, so that views differ.
 SHORTEST_MOVE = 0.35
-# Voxels kept between a moved camera or light and the nearest surface.
+# A choice: smallest distance between a moved camera or light and the nearest occupied voxel, in voxels.
 CLEARANCE = 1.8
+# A choice: most moves tried for one view, each smaller than the one before.
 ATTEMPTS = 60
-# Least share of rays that must meet something, and of the surfaces seen that must be lit; where the start has
-# less, relative to the start.
+# Choices: least share of rays that must hit a surface, and of visible surfaces that must be lit directly. If
+# the start view has less, a fraction of its own share is enough.
 LEAST_HITS, LEAST_LIT = 0.6, 0.08
-# Which random stream moves the views of a split.
+# Random stream of each split. The numbers are part of the seed, so changing one changes the views.
 _STREAMS: dict[Split, int] = {"fitted": 0, "held_out": 1, "validation": 2}
 
 
 @dataclass(frozen=True, eq=False)
 class _Start:
-    """The view that all others are moved from."""
+    """The unmoved view, from which all others are derived."""
 
     space: FreeSpace
     camera: Camera
@@ -59,12 +61,24 @@ def views_for_scene(
     size: tuple[int, int],
     seed: int,
 ) -> tuple[View, ...]:
-    """`fitted` views, the first of them the given camera and lights unmoved, then `validation` and
-    `held_out` ones.
+    """Views of all three splits. The first fitted view has the given camera and lights; all others move them.
 
-    Each moved view has a random stream of its own, so that asking for more leaves the others as they were.
-    Moved cameras and lights stay in free space in sight of where they started; a moved light keeps its kind
-    and cones, and the irradiance at what it lights.
+    Each moved view has its own random stream, so asking for more views does not change the others. Moved
+    cameras and lights stay in free space, visible from where they started. A moved light keeps its kind, its
+    cones and the irradiance on the surfaces that it lights.
+
+    Args:
+        scene: the scene.
+        camera: the camera to start from.
+        lights: the lights to start from.
+        fitted: number of fitted views, at least 1.
+        validation: number of validation views.
+        held_out: number of held-out views.
+        size: width and height in pixels.
+        seed: of the random moves.
+
+    Returns:
+        The fitted, then the validation, then the held-out views, named "fitted_0" and so on.
 
     Raises:
         ValueError: `fitted` is less than 1, or `validation` or `held_out` is negative.
@@ -89,7 +103,7 @@ def views_for_scene(
 
 
 def _moved(start: _Start, random: np.random.Generator) -> tuple[Camera, tuple[Light, ...]]:
-    """The first acceptable one of ever smaller moves; the smallest is a hundredth of the largest."""
+    """Try smaller and smaller moves, down to 1/100 of the largest, and return the first acceptable one."""
     for attempt in range(ATTEMPTS):
         amount = 0.01 ** (attempt / (ATTEMPTS - 1))
         camera = _moved_camera(start, amount, random)
@@ -109,12 +123,12 @@ def _acceptable(start: _Start, camera: Camera, lights: tuple[Light, ...]) -> boo
 
 
 def _moved_camera(start: _Start, amount: float, random: np.random.Generator) -> Camera:
-    """Moved across and along the view; it still looks at about what lay in the middle of the start view."""
+    """The camera moved by up to `CAMERA_MOVE`. It still looks at roughly the middle of the start view."""
     space, to_world = start.space, start.camera.to_world
     depth = start.sight.depth() or 0.5 * float(np.linalg.norm(space.shape))
     eye = space.to_voxels(start.camera.position_world)
     target = eye - depth * to_world[:3, 2] + TARGET_MOVE * amount * depth * _in_ball(random)
-    # Half as far up and down, so that eye height is about kept.
+    # Half as far up and down, to stay near eye height.
     offset = CAMERA_MOVE * amount * depth * _in_shell(random) * np.array([1.0, 0.5, 1.0])
     moved = _as_far_as_free(space, eye, offset)
     up = to_world[:3, 1] if abs(to_world[1, 2]) > 0.98 else None
@@ -131,14 +145,14 @@ def _moved_light(space: FreeSpace, light: Light, amount: float, random: np.rando
     reach = math.sqrt(before) / space.voxel_world or 0.25 * float(np.linalg.norm(space.shape))
     position = space.to_voxels(light.position_world)
     moved = _as_far_as_free(space, position, LIGHT_MOVE * amount * reach * _in_shell(random))
-    # What lay ahead of the spot stays about ahead of it.
+    # The spot still aims at roughly the same place.
     target = position + reach * light.direction_world + TARGET_MOVE * amount * reach * _in_ball(random)
     towards = target - moved
     direction = towards / np.linalg.norm(towards) if light.kind == "spot" else light.direction_world
     there = dataclasses.replace(light, position_world=space.to_world(moved), direction_world=direction)
     after = mean_square_distance_world(space, light_hits(space, there))
     if before > 0.0 and after > 0.0:
-        # Irradiance goes with intensity over the mean square distance.
+        # Irradiance is proportional to intensity / mean square distance; keep it.
         there = dataclasses.replace(there, intensity=light.intensity * (after / before))
     return there
 
@@ -146,9 +160,9 @@ def _moved_light(space: FreeSpace, light: Light, amount: float, random: np.rando
 def _as_far_as_free(
     space: FreeSpace, start: Float64[np.ndarray, "3"], offset: Float64[np.ndarray, "3"]
 ) -> Float64[np.ndarray, "3"]:
-    """The farthest free point in sight along an offset, or against it where that goes farther."""
+    """The farthest free and visible point along `offset`, or along −`offset` if that leads farther."""
     there, back = _free_along(space, start, offset), _free_along(space, start, -offset)
-    # By at least a voxel, so that a tie in open space is not decided by rounding.
+    # Farther by more than a voxel, so that rounding does not decide a tie in open space.
     return back if np.linalg.norm(back - start) > np.linalg.norm(there - start) + 1.0 else there
 
 
@@ -161,20 +175,20 @@ def _free_along(
     free = float(march_rays(space, start[None, :], offset[None, :] / length).distance[0])
     steps = np.linspace(1.0, 0.0, 17)[:-1]
     points = start + steps[:, None] * offset
-    # A start that is itself close to a surface need not be left for a place farther from it.
+    # If the start itself is close to a surface, its own clearance is enough.
     needed = min(CLEARANCE, float(space.clearance_at(start[None, :])[0]))
     good = (steps * length < free) & (space.clearance_at(points) >= needed)
     return points[int(good.argmax())] if good.any() else start
 
 
 def _in_ball(random: np.random.Generator) -> Float64[np.ndarray, "3"]:
-    """A point of the unit ball, evenly spread."""
+    """A uniform random point in the unit ball."""
     direction = random.standard_normal(3)
     return direction / np.linalg.norm(direction) * random.uniform() ** (1.0 / 3.0)
 
 
 def _in_shell(random: np.random.Generator) -> Float64[np.ndarray, "3"]:
-    """A point between the radii `SHORTEST_MOVE` and 1."""
+    """A random point whose distance from the origin is uniform between `SHORTEST_MOVE` and 1."""
     direction = random.standard_normal(3)
     return direction / np.linalg.norm(direction) * random.uniform(SHORTEST_MOVE, 1.0)
 
@@ -182,7 +196,7 @@ def _in_shell(random: np.random.Generator) -> Float64[np.ndarray, "3"]:
 def _turned(
     direction: Float64[np.ndarray, "3"], angle: float, random: np.random.Generator
 ) -> Float64[np.ndarray, "3"]:
-    """A unit direction turned by `angle` about a random axis square to it."""
+    """A unit direction turned by `angle` (radians) about a random axis perpendicular to it."""
     u, v = frame_of(direction)
     azimuth = random.uniform(0.0, 2.0 * math.pi)
     return math.cos(angle) * direction + math.sin(angle) * (math.cos(azimuth) * u + math.sin(azimuth) * v)

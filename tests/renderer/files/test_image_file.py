@@ -1,4 +1,4 @@
-"""Images on disk: what is written reads back, orientation and bits kept."""
+"""Image files: what is written reads back with the same orientation and bits."""
 
 from pathlib import Path
 
@@ -61,7 +61,7 @@ def test_refusals_leave_nothing_behind(tmp_path):
         write_png(tmp_path / "a.exr", image)
     with pytest.raises(InputError, match=r"must end in .exr, got '.png'"):
         write_exr(tmp_path / "a.png", image)
-    with pytest.raises(InputError, match="holds NaN"):
+    with pytest.raises(InputError, match="must not hold NaN"):
         write_png(tmp_path / "a.png", image * np.nan)
     assert not list(tmp_path.iterdir())
 

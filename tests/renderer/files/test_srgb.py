@@ -1,4 +1,4 @@
-"""The sRGB curve at points that the standard gives."""
+"""The sRGB transfer curve at points from the standard."""
 
 import numpy as np
 
@@ -12,19 +12,19 @@ def test_black_white_and_the_middle():
 
 
 def test_the_two_pieces_meet():
-    # The standard's rounded constants leave a step of 3e-8 there.
+    # The standard's rounded constants leave a step of 3e-8 at the junction.
     either_side = srgb_from_linear(np.array([0.0031308, 0.0031308 + 1e-12]))
     assert abs(np.diff(either_side)[0]) < 1e-7
 
 
 def test_outside_values_are_clamped_and_single_precision_stays():
-    # 1.055 - 0.055 is off 1 by one rounding.
+    # 1.055 - 0.055 differs from 1 by one rounding.
     outside = srgb_from_linear(np.array([-1.0, 2.0, np.inf]))
     np.testing.assert_allclose(outside, [0.0, 1.0, 1.0], atol=1e-15)
     assert srgb_from_linear(np.ones(3, np.float32)).dtype == np.float32
 
 
 def test_decoding_undoes_encoding():
-    # The two pieces of the rounded standard disagree by 3e-8 where they meet.
+    # With the standard's rounded constants, the two pieces differ by 3e-8 at the junction.
     linear = np.linspace(0.0, 1.0, 1001)
     np.testing.assert_allclose(linear_from_srgb(srgb_from_linear(linear)), linear, atol=1e-7)

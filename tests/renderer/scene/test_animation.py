@@ -1,4 +1,4 @@
-"""Interpolation of keyframes against closed forms (glTF 2.0 appendix C)."""
+"""Keyframe interpolation compared with closed forms (glTF 2.0 appendix C)."""
 
 import dataclasses
 
@@ -11,19 +11,19 @@ from vpltune.renderer.scene.scene_animation import Animation, Channel
 
 
 def about(axis, angle):
-    """The quaternion of a turn about a unit axis."""
+    """The quaternion of a rotation about a unit axis."""
     return np.array([*(np.asarray(axis) * np.sin(angle / 2.0)), np.cos(angle / 2.0)])
 
 
 def rotation_matrix(axis, angle):
-    """Rodrigues 1840."""
+    """The matrix of a rotation about a unit axis (Rodrigues 1840)."""
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
 
 
 def moving_room(*channels, parents=(-1,), rest_translation=None):
-    """The colored room, all of it hung on the last of a few nodes."""
+    """The coloured room, with all instances attached to the last node."""
     scene = colored_room()
     count, instances = len(parents), len(scene.instances)
     translation = np.zeros((count, 3)) if rest_translation is None else np.array(rest_translation, np.float64)
@@ -78,7 +78,7 @@ def test_slerp_keeps_unit_length():
     random = np.random.default_rng(5)
     first, second = random.normal(size=(2, 1000, 4))
     turned = slerp(first, second, random.random((1000, 1)))
-    # 1e-8: below the smallest arc the chord stands in for it.
+    # 1e-8: below the smallest arc, interpolation is linear.
     np.testing.assert_allclose(np.linalg.norm(turned, axis=1), 1.0, atol=1e-8)
 
 
@@ -88,7 +88,7 @@ def test_a_step_holds_until_the_next_key():
 
 
 def test_a_cubic_spline_is_a_cubic():
-    """With the values and slopes of a polynomial of degree three at its keys, a spline is that polynomial."""
+    """A spline with the values and slopes of a cubic polynomial at its keys is that polynomial."""
     polynomial = np.polynomial.Polynomial([0.5, -2.0, 3.0, 1.5])
     slope = polynomial.deriv()
     times = np.array([0.0, 0.7, 2.0])
@@ -107,7 +107,7 @@ def test_a_cubic_rotation_is_normalised():
     scene = moving_room(channel("rotation", "cubic_spline", [0, 1], keys, tangents=np.zeros((2, 2, 4))))
     linear = transform_at(scene, 0.5)[:3, :3]
     np.testing.assert_allclose(linear @ linear.T, np.eye(3), atol=1e-12)
-    # Half-way between two keys with flat tangents lies half-way round.
+    # With zero tangents, the middle between two keys is half the rotation.
     np.testing.assert_allclose(linear, rotation_matrix(axis, 0.5), atol=1e-12)
 
 
@@ -122,7 +122,7 @@ def test_a_clip_of_one_key_is_a_pose():
 
 
 def test_the_hierarchy_is_a_product_of_matrices():
-    """An arm of two links: the hand is where trigonometry puts it."""
+    """The end of an arm with two links is where trigonometry puts it."""
     z = [0.0, 0.0, 1.0]
     scene = moving_room(
         channel("rotation", "linear", [0, 1], [about(z, 0.0), about(z, 1.0)], node=0),

@@ -1,4 +1,4 @@
-"""Dynamic lights: closed forms, three ways to one image, and what a frame of them costs in calls."""
+"""Dynamic lights: closed forms, three passes that must agree, and the number of GL calls per frame."""
 
 import moderngl
 import numpy as np
@@ -31,11 +31,11 @@ from vpltune.renderer.techniques.light_per_draw import LightPerDrawPass
 
 WAYS = (LightPerDrawPass, LightVolumesPass, TiledLightsPass)
 SIZE = (136, 72)
-"""Neither a whole number of tiles nor one cell only."""
+"""Not a whole number of tiles, and more than one cell."""
 
 
 class Lighting:
-    """A drawn G-buffer and the three ways to light it."""
+    """A G-buffer and the three passes that can light it."""
 
     def __init__(self, context, scene, view):
         self.context = context
@@ -56,13 +56,13 @@ class Lighting:
 
 @pytest.fixture(scope="module")
 def room(gl_context):
-    """The coloured room from inside its open side."""
+    """The coloured room, seen from just inside its open side."""
     camera = Camera(look_at(np.array([0.1, 0.05, 0.9]), np.array([-0.1, -0.1, -1.0])), 1.2)
     return Lighting(gl_context, colored_room(), View("room", "fitted", SIZE, camera, ()))
 
 
 def expected_irradiance(captured, light) -> np.ndarray:
-    """The formula of renderer/scene/dynamic_lights.py in double precision."""
+    """The formula in renderer/scene/dynamic_lights.py, in double precision."""
     to_light = light["position_world"].astype(np.float64) - captured.position_world
     square = (to_light**2).sum(axis=-1)
     towards = to_light / np.sqrt(square)[..., None]
@@ -76,7 +76,7 @@ def expected_irradiance(captured, light) -> np.ndarray:
 
 
 def random_lights(count, seed, reach=0.4):
-    """Half points, half spots, in and around the room, some of them behind the camera."""
+    """Half points and half spots, in and around the room. Some are behind the camera."""
     rng = np.random.default_rng(seed)
     positions = rng.uniform(-1.3, 1.3, (count, 3))
     directions = rng.normal(size=(count, 3))
@@ -114,10 +114,10 @@ SINGLE_LIGHTS = {
 @pytest.mark.parametrize("way", [way.__name__ for way in WAYS])
 @pytest.mark.parametrize("name", SINGLE_LIGHTS)
 def test_one_light_is_its_closed_form(room, name, way):
-    """To 1e-3 of the value: half floats round to 5e-4, the rest is single precision.
+    """To a relative 1e-3: half floats round to 5e-4, and all else is single precision.
 
-    Near zero half floats have steps of fixed size; near the floor the distance to the light itself, a
-    difference of positions, is good to 1e-4.
+    The absolute tolerance is for values near zero, where half floats have steps of fixed size. Near the
+    floor, the distance to the light is a difference of positions that is accurate to 1e-4.
     """
     records = SINGLE_LIGHTS[name]
     expected = expected_irradiance(room.captured, records[0])
@@ -128,7 +128,7 @@ def test_one_light_is_its_closed_form(room, name, way):
 
 
 def test_three_ways_give_one_image(room):
-    """400 lights of both kinds, to 1e-3: the largest difference is one rounding to half floats."""
+    """400 lights of both kinds give the same image to 1e-3, which is one rounding of half floats."""
     records = random_lights(400, seed=1)
     images = [room.irradiance(records, way.__name__) for way in WAYS]
     assert (images[0] > 0.0).any(axis=-1).mean() > 0.4
@@ -137,7 +137,7 @@ def test_three_ways_give_one_image(room):
 
 
 def test_more_lights_than_a_batch_holds(room):
-    """A tile goes through its lights batch by batch; none is lost, wherever it stands in the list."""
+    """A tile processes its lights in batches. No light is lost, wherever it is in the list."""
     count = 2 * TILE_BATCH + 77
     records = random_lights(count, seed=2, reach=0.08)
     tiles, volumes = (room.irradiance(records, way) for way in ("TiledLightsPass", "LightVolumesPass"))
@@ -153,7 +153,7 @@ def test_more_lights_than_a_batch_holds(room):
 
 
 def test_every_light_in_one_place(room):
-    """All lights reach the same tiles: nothing overflows, and all of them count."""
+    """All lights reach the same tiles. Nothing overflows, and every light contributes."""
     one = SINGLE_LIGHTS["point"]
     np.testing.assert_allclose(
         room.irradiance(np.repeat(one, 1000)), 1000.0 * room.irradiance(one), rtol=2e-3, atol=1e-2
@@ -162,7 +162,7 @@ def test_every_light_in_one_place(room):
 
 @pytest.mark.parametrize("way", [way.__name__ for way in WAYS])
 def test_energy_adds_up(room, way):
-    """Two sets of lights together give the sum of each alone; twice the intensity, twice the light."""
+    """Two sets of lights together give the sum of both. Doubled intensity gives doubled irradiance."""
     first, second = random_lights(40, seed=3), random_lights(40, seed=4)
     both = room.irradiance(np.concatenate([first, second]), way)
     separate = room.irradiance(first, way) + room.irradiance(second, way)
@@ -174,7 +174,7 @@ def test_energy_adds_up(room, way):
 
 @pytest.mark.parametrize("way", [way.__name__ for way in WAYS])
 def test_nothing_beyond_the_range(room, way):
-    """A light whose range ends before any surface gives exactly nothing."""
+    """A light with no surface within its range gives exactly zero."""
     records = point_lights(np.array([[0.0, 0.0, 0.0]]), np.ones(3), 0.2)
     nearest = np.linalg.norm(room.captured.position_world[room.captured.valid], axis=1).min()
     assert nearest > 0.2
@@ -184,7 +184,7 @@ def test_nothing_beyond_the_range(room, way):
 @pytest.mark.parametrize("factor", [0.01, 0.1, 10.0, 100.0])
 @pytest.mark.parametrize("path", ["volumes", "tiles"])
 def test_scale_changes_nothing(gl_context, path, factor):
-    """Scene, camera, lights scaled together: the same image to 1e-3 relative RMSE."""
+    """Scene, camera and lights scaled together give the same image, to 1e-3 relative RMSE."""
     view, records = room_view("spot"), random_lights(200, seed=5)
     images = []
     for scale in (1.0, factor):
@@ -199,7 +199,7 @@ def test_scale_changes_nothing(gl_context, path, factor):
 
 @pytest.mark.parametrize("path", ["auto", "volumes", "tiles"])
 def test_the_frame_adds_them_to_the_direct_light(gl_context, path):
-    """Direct irradiance with lights, less that without, is what the lights give; the rest is untouched."""
+    """Direct irradiance grows by what the lights give. Indirect irradiance does not change."""
     runtime = Runtime(colored_room(), "default", RuntimeOptions(light_path=path), context=gl_context)
     view, records = room_view("spot"), random_lights(50, seed=6)
     without, with_lights = runtime.capture(view), runtime.capture(view, lights=DynamicLights(records))
@@ -216,7 +216,7 @@ def test_the_frame_adds_them_to_the_direct_light(gl_context, path):
 
 
 def test_auto_measures_both_ways_once(gl_context):
-    """The choice is one of the two that were timed, the faster, and holds: frames repeat bitwise."""
+    """The faster of the two timed passes is chosen and kept, so frames repeat bitwise."""
     runtime = Runtime(colored_room(), "default", context=gl_context)
     view, lights = room_view("spot"), DynamicLights(random_lights(60, seed=7))
     first = runtime.capture(view, lights=lights).direct_irradiance
@@ -232,7 +232,7 @@ def test_auto_measures_both_ways_once(gl_context):
 
 @pytest.mark.parametrize("path", ["volumes", "tiles"])
 def test_a_thousand_lights_take_few_calls(gl_context, monkeypatch, path):
-    """At most four draw and dispatch calls, and one buffer write, more than the same frame without lights."""
+    """Lights add at most four draw or dispatch calls, and one buffer write, to a frame."""
     calls = {"draw": 0, "write": 0}
 
     def counted(owner, name, kind):
@@ -261,7 +261,7 @@ def test_a_thousand_lights_take_few_calls(gl_context, monkeypatch, path):
 
 
 def test_a_sphere_proxy_holds_the_sphere():
-    """Every face of the mesh is at least 1 from the centre, winds outwards, and the mesh is closed."""
+    """The mesh is closed, winds outwards, and every face is at least 1 from the centre."""
     vertices, triangles = sphere_proxy()
     assert len(triangles) == 80
     assert_closed_around(vertices[triangles], np.zeros(3), triangles)
@@ -271,7 +271,7 @@ def test_a_sphere_proxy_holds_the_sphere():
 
 @pytest.mark.parametrize("outer", [0.01, 0.3, 0.8, 1.2, 1.5, np.pi / 2])
 def test_a_cone_proxy_holds_the_cone(outer):
-    """The mesh that light_volumes.vert makes is convex and holds the sector of the sphere within the cone."""
+    """The mesh that light_volumes.vert builds is convex and contains the spherical sector of the cone."""
     shares, triangles = cone_proxy()
     angle = np.arctan2(np.sin(outer), np.cos(outer) * CONE_DEFINES["AZIMUTH_COSINE"])
     polar = np.maximum(shares[:, 0], 0.0) * angle
@@ -285,7 +285,7 @@ def test_a_cone_proxy_holds_the_cone(outer):
     sector = np.column_stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
     corners = vertices[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    # Inside every face's plane: for a convex body that is inside. 1e-9: rounding.
+    # A point behind the planes of all faces is inside a convex body. 1e-9: rounding.
     for points in (sector, vertices):
         heights = points @ normals.T - (normals * corners[:, 0]).sum(axis=1)
         assert heights.max() < 1e-9
@@ -297,7 +297,7 @@ def face_distances(corners):
 
 
 def assert_closed_around(corners, inside, triangles):
-    """Each edge is met once in either direction, and every face looks away from `inside`."""
+    """Each edge occurs once in either direction, and every face points away from `inside`."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert ((normals * (corners[:, 0] - inside)).sum(axis=1) > 0.0).all()
     edges = [(int(t[i]), int(t[(i + 1) % 3])) for t in triangles for i in range(3)]
@@ -329,7 +329,7 @@ def test_the_unit_follows_the_lights_not_their_scale():
     ("field", "value", "message"),
     [
         ("range", 0.0, "every range must be positive, got 0.0"),
-        ("intensity", -1.0, "no intensity may be negative, got -1.0"),
+        ("intensity", -1.0, "every intensity must be ≥ 0, got -1.0"),
         ("position_world", np.nan, "every number must be finite"),
     ],
 )
@@ -343,12 +343,12 @@ def test_lights_that_cannot_be_are_refused(field, value, message):
 def test_records_of_another_kind_are_refused():
     with pytest.raises(ValueError, match="must be .n. of DYNAMIC_LIGHT_DTYPE, got .3, 12. float32"):
         DynamicLights(np.zeros((3, 12), np.float32))
-    with pytest.raises(ValueError, match="0 ≤ inner < outer ≤ π/2 must hold, got 0.5 and 0.4"):
+    with pytest.raises(ValueError, match="cone angles must satisfy 0 ≤ inner < outer ≤ π/2, got 0.5 and 0.4"):
         spot((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0, 0.5, 0.4)
 
 
 def test_lights_that_touch_a_floor_stay_finite(gl_context):
-    """A light on the surface itself: bright, and bounded by MIN_DISTANCE, never infinite."""
+    """A light on a surface is bright but finite, because MIN_DISTANCE bounds it."""
     floor = scene_of([quad((-1, 0, -1), (0, 0, 2), (2, 0, 0))], [(0.5, 0.5, 0.5)])
     camera = Camera(look_at(np.array([0.0, 2.0, 0.0]), np.zeros(3)), 0.9)
     for path in ("volumes", "tiles"):

@@ -1,4 +1,4 @@
-"""RSM faces of moving lights and in moving bounds: they hold the scene, turn smoothly and keep their grid."""
+"""RSM faces contain the scene, turn smoothly with their light, and keep their grid while bounds change."""
 
 import dataclasses
 
@@ -17,7 +17,7 @@ def sun(direction):
 
 
 def corners_on_face(record, bounds):
-    """The corners of `bounds` in the face's own coordinates, in [−1, 1] where it holds them."""
+    """The corners of `bounds` in face coordinates. They are in [−1, 1] if the face contains them."""
     corners = bounds[[[c >> axis & 1 for axis in range(3)] for c in range(8)], np.arange(3)]
     matrix = record["light_to_world"].astype(np.float64).T
     return ((corners - matrix[:3, 3]) @ matrix[:3, :3])[:, :2] / record["extent"]
@@ -33,7 +33,7 @@ def test_a_suns_face_holds_all_bounds(snapping):
 
 
 def test_a_snapped_grid_stands_still_while_bounds_move():
-    """Sizes are a few steps, and two faces of one size lie whole cells apart: no texel crawls."""
+    """Few sizes occur, and faces of the same size are whole cells apart, so no texel crawls."""
     light = sun([0.3, -1.0, 0.2])
     faces = []
     for growth in np.linspace(0.0, 2.0, 101):
@@ -60,9 +60,9 @@ def test_snapping_costs_little_size():
 
 
 def test_a_turning_light_turns_its_face_smoothly():
-    """Sweeping a spot through straight down turns its face as little as its axis: nowhere does it roll over.
+    """A spot that sweeps through straight down never makes its face roll over.
 
-    The face may turn at most three times as far as the axis, the bound of the rule's roll up to the horizon.
+    The face may turn at most three times as far as the axis, a bound for the roll down from the horizon.
     """
     spot = ROOM_LIGHTS["spot"]
     bounds = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])

@@ -1,4 +1,4 @@
-"""Bouncing lights: they stay in free space, keep their energy, and depend on time and seed alone."""
+"""Bouncing lights stay in free space, conserve energy, and depend on time and seed alone."""
 
 import numpy as np
 import pytest
@@ -11,13 +11,13 @@ from vpltune.renderer.scene.scene import scaled, scaled_light
 
 
 def energy(lights: BouncingLights) -> np.ndarray:
-    """Kinetic and potential energy of each light, per mass, in voxels² per second²."""
+    """Kinetic plus potential energy of each light per unit mass, in voxels² per second²."""
     gravity = GRAVITY * max(lights._space.shape)
     return 0.5 * (lights._velocity**2).sum(axis=1) + gravity * (lights._position[:, 1] - lights._low[1])
 
 
 def test_lights_stay_in_free_space():
-    """After 30 seconds none is in a surface's voxel or out of the scene's bounds, and all have moved."""
+    """In 30 seconds no light enters an occupied voxel or leaves the scene's bounds, and all lights move."""
     scene = colored_room()
     lights, space = BouncingLights(scene, 500, 0, 10.0), free_space(scene)
     start = lights.records["position_world"].copy()
@@ -33,9 +33,9 @@ def test_lights_stay_in_free_space():
 
 
 def test_energy_is_kept():
-    """Bounces are elastic: over 20 seconds the mean energy moves by less than 1 %, one light's by 10 %.
+    """Bounces are elastic: in 20 s the mean energy changes by less than 1 %, that of any light by 10 %.
 
-    A light that skims a surface is given the little speed that takes it off again.
+    Single lights change more because a light that skims a surface gets a little speed to leave it.
     """
     lights = BouncingLights(colored_room(), 500, 1, 10.0)
     start = energy(lights)
@@ -46,7 +46,7 @@ def test_energy_is_kept():
 
 
 def test_time_steps_do_not_matter():
-    """One second in one step, in 7 or in 100 is the same second, to the rounding of the sum of steps."""
+    """One second in 1, 7 or 100 steps gives the same positions, up to rounding of the sum of steps."""
     positions = []
     for steps in (1, 7, 100):
         lights = BouncingLights(colored_room(), 200, 2, 10.0)
@@ -59,7 +59,7 @@ def test_time_steps_do_not_matter():
 
 @pytest.mark.parametrize("factor", [0.01, 100.0])
 def test_motion_is_that_of_the_scaled_scene(factor):
-    """Places and ranges grow with the scene, intensities with its square: irradiance stays."""
+    """Positions and ranges scale with the scene, intensities with its square, so irradiance is kept."""
     plain = BouncingLights(colored_room(), 100, 3, 10.0)
     grown = BouncingLights(scaled(colored_room(), factor), 100, 3, 10.0 * factor**2)
     for lights in (plain, grown):
@@ -77,7 +77,7 @@ def test_a_seed_repeats_and_another_does_not():
 
 
 def test_flux_is_what_was_asked_for():
-    """Points give 4πI, cones 2π(1 − cos outer)I: the channels' mean is `flux` over all lights."""
+    """A point light emits 4πI, a spot 2π(1 − cos outer)I. Each light gets an equal share of `flux`."""
     lights = DynamicLights(BouncingLights(colored_room(), 80, 6, 25.0).records)
     assert (lights.point_count, lights.spot_count) == (60, 20)
     solid_angle = np.full(80, 4.0 * np.pi)
@@ -93,7 +93,7 @@ def test_no_light_is_no_trouble():
 
 
 def test_flux_beside_a_view_grows_with_its_lights_and_with_the_scene():
-    """Twice the light, twice the flux; ten times the scene, a hundred times; in the dark, π W/m²."""
+    """Flux is proportional to light and to the square of scale. Without lights it stands for π W/m²."""
     scene = colored_room()
     for light in ROOM_LIGHTS.values():
         plain = flux_beside(scene, (light,))

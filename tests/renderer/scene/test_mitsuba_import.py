@@ -1,4 +1,4 @@
-"""Mitsuba scenes imported without Mitsuba, and held against what Mitsuba itself makes of them."""
+"""Import of Mitsuba scenes, compared with what Mitsuba itself renders."""
 
 import json
 import math
@@ -20,7 +20,7 @@ from vpltune.renderer.scene.views import View
 
 SIZE = (96, 64)
 
-# Every shape and step of a transform, in names of version 0.5 and of version 3.
+# Every shape and every step of a transform, with the names of version 0.5 or of version 3.
 SCENE = """<scene version="{version}">
   <default name="tilt" value="25"/>
   <sensor type="perspective">
@@ -82,7 +82,7 @@ AREA_LIGHT = """<shape type="{shape}">
 
 def scene_file(folder, text=None, version="3.0.0", more=""):
     (folder / "tex").mkdir(exist_ok=True)
-    # Smooth, since the two renderers filter differently, and without symmetry.
+    # A smooth image, since the two renderers filter differently. It has no symmetry, to reveal flips.
     v, u = np.mgrid[0:64, 0:64] / 63.0
     image = np.stack([0.2 + 0.7 * u, 0.9 - 0.6 * v, 0.3 + 0.4 * u * v], axis=-1)
     Image.fromarray((255 * image).astype(np.uint8)).save(folder / "tex" / "image.png")
@@ -105,11 +105,11 @@ def test_mitsuba_sees_the_same_surfaces_and_colours(tmp_path, version):
     their_depth, their_albedo, their_normal = _mitsuba_layers(path, view)
     seen = their_depth > 0.0
     assert (seen == (depth > 0.0)).mean() > 0.99
-    # Round shapes are polygons here: 0.1 % flatter. Pixels on outlines may see either side.
+    # Round shapes are polygons here, 0.1 % flatter. Pixels on outlines may show either surface.
     near = seen & (np.abs(depth - their_depth) < 0.01 * their_depth)
     assert near.sum() > 0.97 * seen.sum()
     assert np.abs(albedo - their_albedo)[near].mean() < 0.01
-    # Where an image repeats, at its borders, one texel or one pixel is smoothed.
+    # Where an image repeats, a texel or a pixel is smoothed at the border.
     assert np.quantile(np.abs(albedo - their_albedo)[near], 0.94) < 0.03
     assert np.quantile(1.0 - (normal * their_normal).sum(axis=-1)[near], 0.97) < 0.002
 
@@ -170,10 +170,10 @@ def test_an_area_light_keeps_its_flux(tmp_path, shape, kind, area):
     (light,) = scene.lights
     assert light.kind == kind
     flux = math.pi * area * np.array([4.0, 2.0, 1.0])
-    # The cone's own fall-off, integrated over directions.
+    # The integral of the cone's falloff over directions.
     cosine = (np.arange(10_000) + 0.5) / 10_000
     lobe = 4.0 * math.pi if kind == "point" else 2.0 * math.pi * float((cosine**2).mean())
-    # Polygons of 80 sides have 0.1 % less area than circles, and spheres of them 0.2 %.
+    # Polygons of 80 sides have 0.1 % less area than circles, and spheres made of them 0.2 %.
     np.testing.assert_allclose(light.intensity * lobe, flux, rtol=3e-3)
     np.testing.assert_allclose(light.position_world, (0.0, 2.0, 0.0), atol=2e-3)
     if kind == "spot":
@@ -213,7 +213,7 @@ def test_an_environment_becomes_a_sun_where_it_is_brightest(tmp_path):
     path = scene_file(tmp_path, more=more)
     scene = read_mitsuba(path)
     (sun,) = scene.lights
-    # Where Mitsuba itself says that the bright texel is.
+    # Mitsuba itself has the bright texel in this direction.
     environment = mi.load_file(str(path)).environment()
     interaction = mi.SurfaceInteraction3f()
     interaction.wi = mi.Vector3f(*sun.direction_world)
@@ -278,20 +278,20 @@ REFUSED = {
     ),
     "not XML": ("<scene version='3.0.0'>", "not XML"),
     "empty": (" ", "not XML"),
-    "not a scene": ("<svg/>", "line 1: <svg>: a Mitsuba scene's outermost element is <scene>"),
+    "not a scene": ("<svg/>", "line 1: <svg>: the root element of a Mitsuba scene must be <scene>"),
     "deep": ("<scene>" + '<bsdf type="twosided">' * 100, "at most 64 deep"),
     "no shapes": ('<scene version="3.0.0"/>', "the scene has no triangles"),
     "shape": (
         '<scene><shape type="hair"/></scene>',
-        "line 1: shape 'hair': shapes of this type are not read",
+        "line 1: shape 'hair': unsupported shape type; must be one of obj, ply",
     ),
     "material": ('<scene><shape type="cube"><bsdf type="velvet"/></shape></scene>', "bsdf 'velvet'"),
     "emitter": ('<scene><shape type="cube"/><emitter type="sunsky"/></scene>', "emitter 'sunsky'"),
-    "element": ('<scene><shape type="cube"><wheel name="a"/></shape></scene>', "<wheel>: such an element"),
+    "element": ('<scene><shape type="cube"><wheel name="a"/></shape></scene>', "<wheel>: unknown element"),
     "no type": ("<scene><shape/></scene>", "attribute 'type' is missing"),
     "file": (
         '<scene><shape type="obj"><string name="filename" value="a.obj"/></shape></scene>',
-        "'a.obj' is not there",
+        "'a.obj' does not exist",
     ),
     "file outside": (
         '<scene><shape type="obj"><string name="filename" value="../a.obj"/></shape></scene>',
@@ -324,7 +324,7 @@ REFUSED = {
     ),
     "reference": (
         '<scene><shape type="cube"><ref id="m"/></shape></scene>',
-        "nothing before it has the id 'm'",
+        "no object with the id 'm' is defined before it",
     ),
     "negative": (
         '<scene><shape type="cube"><bsdf type="diffuse"><rgb name="reflectance" value="-1"/>'

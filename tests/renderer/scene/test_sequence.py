@@ -1,4 +1,4 @@
-"""Sequences: the scene's own cameras and lights follow its animation, and motions come round."""
+"""Sequences: the scene's own cameras and lights follow its animation, and added motions are periodic."""
 
 import dataclasses
 
@@ -13,7 +13,7 @@ from vpltune.renderer.scene.views import View, scaled_view
 
 
 def lit_room(moving: bool):
-    """The room with a light and a camera of its own, both hung on a node that slides along x."""
+    """The room with its own light and camera, both attached to a node that slides along x if `moving`."""
     room = colored_room()
     view = room_view("spot")
     scene = dataclasses.replace(room, lights=(ROOM_LIGHTS["spot"],), cameras=(view.camera,))
@@ -79,7 +79,7 @@ def test_a_camera_of_another_stands_still():
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_motions_come_round(light):
-    """Where it starts it ends, on the way it is elsewhere, and a light stays a light of its kind."""
+    """A motion ends where it starts and moves in between. It moves points and turns other lights."""
     scene, view = lit_room(moving=False), room_view(light)
     sequence = Sequence(scene, view)
     for seconds in (0.0, MOTION_SECONDS):
@@ -119,7 +119,7 @@ def test_auto_adds_nothing_to_an_animation():
 
 
 def test_moments_of_a_larger_scene():
-    """The sequence of a scene grown tenfold is its moments grown tenfold."""
+    """The moments of a scene scaled by 10 are its own moments scaled by 10."""
     scene = lit_room(moving=True)
     grown = Sequence(scene, own_view(scene), "both", factor=10.0).at(0.7)
     plain = Sequence(scene, own_view(scene), "both").at(0.7)

@@ -1,4 +1,4 @@
-"""The scenes in configs/scenes: what the script makes, valid, closed, and of the sizes that they promise."""
+"""The scenes in configs/scenes match their script, are valid and closed, and have the expected sizes."""
 
 import math
 import subprocess
@@ -48,9 +48,9 @@ def test_normals_point_the_way_the_triangles_face(path):
 
 @pytest.mark.parametrize("path", OWN_SCENES, ids=lambda path: path.stem)
 def test_solids_are_closed(path):
-    """Volume by the divergence theorem does not depend on the origin if and only if ∮ n dA = 0.
+    """For a closed surface, ∮ n dA = 0, and the volume by the divergence theorem is positive.
 
-    Flat walls (one plane) and the Cornell blocks, which stand on the floor without a bottom, are left out.
+    Flat walls and the Cornell blocks, which have no bottom face, are not closed and are skipped.
     """
     for mesh in read_scene(path).meshes:
         a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
@@ -63,7 +63,7 @@ def test_solids_are_closed(path):
 
 @pytest.mark.parametrize("path", OWN_SCENES, ids=lambda path: path.stem)
 def test_no_two_faces_share_a_plane_where_they_overlap(path):
-    """Axis-aligned triangles of different meshes in one plane fight for the pixel where they overlap."""
+    """Overlapping coplanar triangles of different meshes cause z-fighting. Only axis-aligned are checked."""
     scene = read_scene(path)
     size = float(np.ptp(scene.bounds(), axis=0).max())
     faces = []
@@ -88,7 +88,7 @@ def test_no_two_faces_share_a_plane_where_they_overlap(path):
 
 
 def test_the_cornell_box_is_the_published_one():
-    """Cornell Box Data: corners in millimetres, 25 mm of film behind a 35 mm lens; here × 0.18."""
+    """Cornell Box Data: corners in mm, a 25 mm film behind a 35 mm lens. Here all is scaled by 0.18."""
     scene = read_scene(next(path for path in OWN_SCENES if path.stem == "cornell-box"))
     millimetre = 0.18e-3
     assert scene.bounds() == pytest.approx(
@@ -99,8 +99,8 @@ def test_the_cornell_box_is_the_published_one():
     assert camera.yfov == pytest.approx(2 * math.atan(12.5 / 35), abs=1e-8)
     assert camera.to_world[:3, 2] == pytest.approx([0, 0, -1])
     colors = {material.name: material.base_color for material in scene.materials}
-    # The spectra as Mitsuba converts them under an equal-energy light, over its white (1.2048, 0.9483,
-    # 0.9087): another illuminant and observer, so a few hundredths apart.
+    # The spectra converted by Mitsuba under an equal-energy light, divided by its white (1.2048, 0.9483,
+    # 0.9087). Another illuminant and observer make a difference of a few hundredths.
     assert colors["white"] == pytest.approx([0.735, 0.737, 0.733], abs=0.02)
     assert colors["green"] == pytest.approx([0.0875, 0.3986, 0.0841], abs=0.03)
     assert colors["red"] == pytest.approx([0.4732, 0.0454, 0.0488], abs=0.03)
@@ -115,7 +115,7 @@ def test_the_cornell_box_is_the_published_one():
 def test_the_gallery_has_a_texture_transform_and_vertex_colours():
     scene = read_scene(next(path for path in OWN_SCENES if path.stem == "gallery"))
     painting = next(mesh for mesh in scene.meshes if scene.materials[mesh.material].texture is not None)
-    # Scaled by (2, 1) and offset by (0.25, 0) from corners of the unit square.
+    # The corners of the unit square, scaled by (2, 1) and offset by (0.25, 0).
     assert painting.uv[:, 0].min() == pytest.approx(0.25) and painting.uv[:, 0].max() == pytest.approx(2.25)
     ball = next(mesh for mesh in scene.meshes if mesh.name.startswith("ball"))
     assert np.ptp(ball.colors[:, 2]) > 0.2

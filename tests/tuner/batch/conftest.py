@@ -1,4 +1,4 @@
-"""A small library, jobs over it, and a cache that is not the user's."""
+"""Fixtures: jobs over small scene files, and a replacement for the fit."""
 
 import hashlib
 from pathlib import Path
@@ -15,7 +15,7 @@ CORNELL_BOX = Path(__file__).resolve().parents[3] / "configs" / "scenes" / "corn
 
 @pytest.fixture
 def make_job(tmp_path):
-    """A job over a scene file with a few bytes in it, or over `scene`."""
+    """Makes a job for `scene`, or for a new file that holds a few bytes and no scene."""
 
     def make(name: str = "room.glb", scene: Path | None = None, size: int = 1) -> Job:
         if scene is None:
@@ -31,7 +31,7 @@ def make_job(tmp_path):
 
 @pytest.fixture
 def fits(monkeypatch):
-    """Takes the place of a fit: which scenes were fitted, and what each ends with."""
+    """Replaces `fit_scene`: `scenes` lists what was fitted; `error`, `status` and `files` set the result."""
     log = SimpleNamespace(scenes=[], error=None, status="improved", files={"tuned.json": "{}"})
 
     def fit_scene(scene_path, output, options, progress):

@@ -1,4 +1,4 @@
-"""A whole library: resumed by default, each content once, and its log read by pandas."""
+"""A batch resumes by default, fits duplicate scenes once, and writes a log that pandas reads."""
 
 import json
 import shutil
@@ -8,7 +8,7 @@ import pandas
 import pytest
 
 from vpltune.renderer.config.tuned_config import TunedConfig, config_text
-from vpltune.renderer.errors import InputError, MachineError
+from vpltune.renderer.errors import InputError
 from vpltune.tuner.batch.batch import run_batch
 from vpltune.tuner.batch.batch_log import BatchLog
 from vpltune.tuner.batch.job import JobOptions
@@ -126,7 +126,7 @@ def test_what_killed_processes_left_is_swept_and_records_are_not(library, fits):
 def test_pandas_reads_the_log(library, fits):
     run(library)
     with (library.parent / "out" / "log.jsonl").open("a") as file:
-        file.write('{"event": "record", "na')  # what a kill in the middle of a line would leave
+        file.write('{"event": "record", "na')  # as if a run had been killed in the middle of a line
     (library / "small.glb").write_bytes(b"!")
     run(library)
     log = pandas.read_json(library.parent / "out" / "log.jsonl", lines=True)
@@ -174,6 +174,6 @@ def test_tensorboard_shows_losses_and_errors(library, fits):
 
 def test_tensorboard_that_is_not_installed_is_said_before_anything_is_fitted(library, fits, monkeypatch):
     monkeypatch.setitem(sys.modules, "tensorboardX", None)
-    with pytest.raises(MachineError, match="tensorboardX is not installed"):
+    with pytest.raises(ModuleNotFoundError, match="tensorboardX"):
         run(library, tensorboard=True)
     assert not fits.scenes

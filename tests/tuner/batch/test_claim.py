@@ -1,4 +1,4 @@
-"""One process at a time holds a claim; a dead one's is free at once, another machine's after silence."""
+"""One process at a time holds a claim; it lapses when the process dies or its host sends no heartbeat."""
 
 import contextlib
 import json
@@ -89,7 +89,7 @@ while done < 15:
 
 
 def test_eight_processes_lose_no_count(tmp_path):
-    """Each reads, adds one and writes under the claim: two at once would lose one of them."""
+    """Each process increments the count under the claim. Two holders at once would lose an increment."""
     (tmp_path / "count").write_text("0")
     crew = [subprocess.Popen([sys.executable, "-c", COUNTER, str(tmp_path)]) for _ in range(8)]
     assert [process.wait(60.0) for process in crew] == [0] * 8

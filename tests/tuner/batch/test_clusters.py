@@ -1,4 +1,4 @@
-"""The same batch on clusters: a real Dask scheduler with workers on loopback, submitit on one machine."""
+"""A batch on clusters: a real Dask scheduler with workers on localhost, and submitit's local executor."""
 
 import contextlib
 import os
@@ -19,6 +19,7 @@ from vpltune.renderer.config.tuned_config import TunedConfig, write_config
 from vpltune.tuner.batch.record import Records
 
 REPOSITORY = Path(__file__).resolve().parents[3]
+# Choices: kills of Dask workers and schedulers, and files in the library.
 WORKER_KILLS = int(os.environ.get("VPLTUNE_WORKER_KILLS", "20"))
 SCHEDULER_KILLS = int(os.environ.get("VPLTUNE_SCHEDULER_KILLS", "5"))
 SCENES = 9
@@ -28,7 +29,7 @@ pytestmark = pytest.mark.slow  # several processes, each of which loads JAX
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory):
-    """Rooms that are quick to fit, and a file that is no scene."""
+    """Rooms that are quick to fit, and one file that is not a scene."""
     folder = tmp_path_factory.mktemp("library")
     own = sorted((REPOSITORY / "configs" / "scenes").glob("*.glb"))
     for index in range(SCENES - 1):
@@ -46,7 +47,7 @@ def arguments(library, out, *more):
 
 
 class Cluster:
-    """A Dask scheduler and two workers with a thread each, as processes of their own."""
+    """A Dask scheduler and two workers with one thread each, as separate processes."""
 
     def __init__(self, folder):
         with socket.socket() as free:
@@ -90,7 +91,7 @@ class Cluster:
 
 
 def kill(process):
-    """SIGKILL to that one process: what it started has to notice."""
+    """Send SIGKILL to this process alone; its children have to notice by themselves."""
     process.send_signal(signal.SIGKILL)
     process.wait()
 
@@ -110,7 +111,7 @@ def cluster(tmp_path):
 
 
 def tuning_processes(folder):
-    """Processes that fit, of this test."""
+    """The tuning processes that this test started."""
     found = []
     for process in psutil.process_iter():
         with contextlib.suppress(psutil.Error):
@@ -178,7 +179,7 @@ def test_a_scheduler_that_does_not_answer_is_said(library, tmp_path, monkeypatch
 
 
 def test_submitit_survives_the_end_of_all_its_tasks(library, tmp_path, monkeypatch):
-    """What they had not done is done by the next array."""
+    """The next array tunes the scenes that the killed tasks had not finished."""
     monkeypatch.setenv("VPLTUNE_CACHE", str(tmp_path / "cache"))
     monkeypatch.setenv("PYTHONPATH", str(REPOSITORY))
     out = tmp_path / "out"

@@ -1,4 +1,4 @@
-"""Whole trees of processes killed at random points: every run resumes, and ends with the same bits."""
+"""Kill the whole process tree at random times: every batch resumes and ends with bit-identical configs."""
 
 import contextlib
 import os
@@ -17,15 +17,16 @@ from vpltune.renderer.config.tuned_config import TunedConfig, write_config
 from vpltune.tuner.batch.record import Records
 
 REPOSITORY = Path(__file__).resolve().parents[3]
+# Choices: kills in all, and scenes in the library.
 KILLS = int(os.environ.get("VPLTUNE_KILLS", "50"))
 SCENES = 6
 
-pytestmark = pytest.mark.slow  # minutes: each run loads JAX and fits scenes in earnest
+pytestmark = pytest.mark.slow  # takes minutes: each run loads JAX and really fits scenes
 
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory):
-    """Scenes that are quick to fit: three rooms, and each once more with another name inside."""
+    """Scenes that are quick to fit: three rooms, each twice, with different bytes in the header."""
     folder = tmp_path_factory.mktemp("library")
     own = sorted((REPOSITORY / "configs" / "scenes").glob("*.glb"))
     for index in range(SCENES):
@@ -60,7 +61,7 @@ def start_batch(library, folder):
 
 
 def kill_tree(process):
-    """SIGKILL to a process and everything below it, the root first, as a machine's end would be."""
+    """Send SIGKILL to a process and all its descendants, the root first, like a power failure."""
     members = [process, *psutil.Process(process.pid).children(recursive=True)]
     for member in members:
         with contextlib.suppress(psutil.NoSuchProcess):
@@ -70,7 +71,7 @@ def kill_tree(process):
 
 
 def finished(folder):
-    """Tuned configs by scene and, for each record, when it and its config were last written."""
+    """Tuned configs by scene; and by key, the mtimes of the record and its config."""
     records = Records(folder / "out")
     configs, stamps = {}, {}
     for key in records.known_keys():
@@ -114,7 +115,7 @@ def test_killed_anywhere_it_resumes_to_the_same_bits(library, tmp_path):
                 kill_tree(process)
             kills += 1
             _, now = finished(folder) if (folder / "out").exists() else ({}, {})
-            # Whatever had a record was not touched again.
+            # No scene with a record was tuned again.
             assert {key: now[key] for key in stamps} == stamps
             interrupted += len(now) < SCENES
             stamps = now
@@ -126,7 +127,7 @@ def test_killed_anywhere_it_resumes_to_the_same_bits(library, tmp_path):
 
 
 def test_two_runs_at_once_share_the_scenes(library, tmp_path):
-    """Neither fits what the other has: together they begin each scene once, and both end with all records."""
+    """Neither run fits a scene that the other has claimed, and both end with all records."""
     both = [start_batch(library, tmp_path) for _ in range(2)]
     for process in both:
         process.communicate(timeout=300)
@@ -144,5 +145,5 @@ def test_ctrl_c_ends_with_130_and_no_process_left(library, tmp_path):
     out, _ = process.communicate(timeout=20)
     assert process.returncode == 130
     assert b'"interrupted"' in out
-    # A dead one may wait for whoever adopted it.
+    # A dead child may remain as a zombie until its new parent reaps it.
     assert not [child for child in children if child.is_running() and child.status() != psutil.STATUS_ZOMBIE]

@@ -1,4 +1,4 @@
-"""What counts as a scene of a library, and what its key hangs on."""
+"""Which files count as scenes of a library, and what the key of a scene depends on."""
 
 import os
 import time
@@ -66,7 +66,7 @@ def test_a_list_that_is_none_is_refused(tmp_path, content, message):
 
 @pytest.mark.parametrize("name", OUTSIDE_SCENES)
 def test_every_file_that_a_reader_opens_is_named(scenes_folder, monkeypatch, name):
-    """Else a scene would not be fitted again when that file changes."""
+    """Otherwise a change to such a file would not trigger another fit."""
     opened = []
     read = SceneFolder._read
 
@@ -86,7 +86,7 @@ def digest(scene):
 
 
 def test_the_key_follows_every_file_of_the_scene(tmp_path):
-    """Its own bytes, its library, a map that the library names with options and spaces, and its sidecar."""
+    """The scene itself, its .mtl file, a texture named there with options and spaces, and its sidecar."""
     scene = tmp_path / "a.obj"
     scene.write_text("mtllib my own.mtl\nv 0 0 0\n")
     (tmp_path / "my own.mtl").write_text("newmtl a\nmap_Kd -s 1 1 1 dark wood.png\n")
@@ -117,7 +117,7 @@ def test_digests_are_kept_until_a_file_changes(tmp_path, monkeypatch):
     scene = tmp_path / "a.glb"
     scene.write_bytes(b"one")
     long_ago = time.time() - 60
-    # A file's time of change cannot be set back, so the clock is set forward.
+    # The ctime of a file cannot be set back, so move the clock forward.
     monkeypatch.setattr(time, "time_ns", lambda: int((long_ago + 120) * 1e9))
     inputs = SceneInputs(tmp_path)
     first = inputs.digest(scene)
@@ -136,7 +136,7 @@ def test_digests_are_kept_until_a_file_changes(tmp_path, monkeypatch):
 
 
 def test_a_file_just_changed_is_not_trusted(tmp_path):
-    """Within one tick of its clock it could change again and look the same."""
+    """It could change again within the same clock tick and keep its timestamp."""
     (tmp_path / "a.glb").write_bytes(b"one")
     inputs = SceneInputs(tmp_path)
     inputs.digest(tmp_path / "a.glb")
@@ -159,7 +159,7 @@ def test_the_key_follows_options_but_not_where_the_start_came_from():
 
 
 def test_scenes_of_others_are_found_and_what_is_left_is_mitsubas(scenes_folder, tmp_path):
-    """The meshes of Mitsuba scenes, 80 OBJ files, are no scenes of their own."""
+    """The meshes of Mitsuba scenes, 80 OBJ files, do not count as scenes."""
     found = set(library_scenes(scenes_folder, leave_out=tmp_path))
     tuned = {f"{folder}/{file}" for folder, file in OUTSIDE_SCENES.items()}
     assert tuned < found

@@ -1,4 +1,4 @@
-"""A tuning process that is slow, greedy or dead: stopped, replaced, its scene set aside."""
+"""A tuning process that exceeds a limit or dies is replaced, and its scene is recorded as failed."""
 
 import json
 import os
@@ -19,7 +19,7 @@ from vpltune.tuner.batch.attempts import tune_with_retries
 from vpltune.tuner.batch.local_scheduler import tune_locally
 from vpltune.tuner.batch.supervised_process import Limits, StoppedError, SupervisedProcess, memory_of
 
-# In place of the process that fits: what it does with a job is in the job's name.
+# Runs in place of the tuning process. The name of a job says what it does.
 STAND_IN = """
 import os, sys, threading, time
 from multiprocessing.connection import Connection
@@ -51,7 +51,7 @@ while True:
         send(connection, {"busy": True})
 """
 
-PLENTY = Limits(60.0, 4 << 30, 0)
+PLENTY = Limits(60.0, 4 << 30, 0)  # a choice: never exceeded here, and no retries
 
 
 @pytest.fixture
@@ -68,7 +68,7 @@ def supervised(tmp_path, monkeypatch):
     [
         ("sleep", Limits(0.5, 4 << 30, 0), "it took longer than the limit of 0.5 s"),
         ("grow", Limits(60.0, 100 << 20, 0), "more than the limit of 100 MiB"),
-        ("die", PLENTY, r"its process died of SIGABRT \(out of luck\)"),
+        ("die", PLENTY, r"its process was killed by SIGABRT \(out of luck\)"),
         ("leave", PLENTY, "its process ended with exit code 7"),
     ],
 )
@@ -151,7 +151,7 @@ def test_the_process_dies_with_its_parent(supervised, make_job, tmp_path):
 
 
 def test_refused_scenes_get_a_record_each_from_real_processes(make_job):
-    """Files that are no scenes, through the real thing: two processes, no retries, no claims left."""
+    """Two real tuning processes get files that are not scenes: no retries, and no claims left."""
     jobs = [make_job(f"room{index}.glb") for index in range(5)]
     events = list(tune_locally(jobs, 2, 1, Limits(120.0, 8 << 30)))
     records = [event for event in events if event["event"] == "record"]
@@ -163,7 +163,7 @@ def test_refused_scenes_get_a_record_each_from_real_processes(make_job):
 
 
 def test_the_command_refuses_resumes_and_reports(tmp_path, capfd):
-    """Files that are no scenes, through the command itself: exit 4, and nothing to do the second time."""
+    """The command itself gets files that are not scenes: exit code 4, and nothing to do the second time."""
     library = tmp_path / "library"
     library.mkdir()
     for index in range(3):

@@ -1,4 +1,4 @@
-"""The forecast: exact where scenes are alike, honest where they are not, silent where it knows nothing."""
+"""The forecast is exact for scenes alike, an honest interval otherwise, and absent before three scenes."""
 
 import io
 
@@ -73,7 +73,7 @@ def test_one_long_scene_is_waited_for():
 
 
 def test_the_span_holds_the_truth_four_times_in_five():
-    """Over random libraries, asked halfway: scenes' seconds scatter as e^N(0, 0.5) about a line in size."""
+    """Forecasts at half time of random batches, whose times scatter by e^N(0, 0.5) about a line in size."""
     random = np.random.default_rng(7)
     held = 0
     for _ in range(200):
@@ -101,7 +101,7 @@ def test_lines_for_a_pipe():
 
 
 def test_bars_on_a_terminal(make_job):
-    """Scenes that ended scroll away above; one at work shows its stage; names are text and no markup."""
+    """Finished scenes scroll up, a running scene shows its stage, and names are not parsed as markup."""
     screen = io.StringIO()
     forecast, jobs = forecast_of(make_job, [5] * 4, workers=1)
     columns = (TextColumn("{task.description} {task.percentage:.0f} {task.fields[note]}", markup=False),)

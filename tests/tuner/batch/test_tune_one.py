@@ -1,4 +1,4 @@
-"""A scene is done once: the record decides, the claim keeps others off, and what was half done is redone."""
+"""A scene is tuned once: the record decides, the claim excludes others, partial output is replaced."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Flicker: a texel's move of every kind of light, and what an image changes by."""
+"""Flicker: how far each kind of light moves, and how the change of an image is measured."""
 
 import math
 from dataclasses import replace
@@ -17,7 +17,7 @@ START = ViewMetrics(0.02, 0.01, 0.5, 0.03, 0.99, 0.05, flicker=0.01)
 
 @pytest.mark.parametrize("kind", ["spot", "directional"])
 def test_a_light_turns_by_a_texel(kind):
-    """And its direction stays of unit length, to float64's rounding."""
+    """It turns by the angle of a texel, and its direction keeps unit length."""
     before = ROOM_LIGHTS[kind]
     (after,) = moved_by_a_texel(room_view(kind), 1.0).lights
     angle = math.acos(float(before.direction_world @ after.direction_world))
@@ -43,7 +43,7 @@ def test_flicker_is_the_mean_change_over_the_mean():
 
 
 def test_a_result_that_flickers_more_is_refused_and_unmeasured_flicker_does_not_count():
-    """Half the error in everything, twice the flicker."""
+    """A result with half of every error but twice the flicker is rejected."""
     half = ViewMetrics(0.01, 0.005, 0.5, 0.015, 0.99, 0.025, flicker=0.02)
     found = judgement("tuned", ArtistParameters(), [START] * 3, [half] * 3)
     assert found.worse == ("flicker up to ×1.91",)

@@ -1,4 +1,4 @@
-"""The robust error: what it is in closed form, and that single pixels do not rule what is fitted by it."""
+"""The robust error: its closed form, and that outliers do not dominate a fit."""
 
 from dataclasses import replace
 
@@ -20,26 +20,27 @@ PLANTED = ArtistParameters(intensity=0.8, falloff_footprint=0.7, vpl_count=256)
 
 
 def counted(scale: float) -> RobustError:
-    """One pixel of irradiance 1 with weight 1: its error is |y − 1|."""
+    """The robust error of one pixel with irradiance 1 and weight 1, whose error is |y − 1|."""
     return RobustError(np.ones((1, 3)), np.ones((1, 3)), scale)
 
 
 @pytest.mark.parametrize("error", [1e-3, 0.1, 1.0, 30.0])
 def test_one_pixel_costs_pseudo_huber(error):
-    """ρ(e) = 2s²(√(1 + (e/s)²) − 1) for s = 0.1, to float64's rounding."""
+    """ρ(e) = 2s²(√(1 + (e/s)²) − 1) for s = 0.1, to 1e-9."""
     expected = 2.0 * 0.1**2 * (np.sqrt(1.0 + (error / 0.1) ** 2) - 1.0)
     assert counted(0.1).cost(np.full((1, 3), 1.0 + error)) == pytest.approx(expected, rel=1e-9)
 
 
 def test_small_errors_count_squared_and_large_ones_linearly():
-    """At a thousandth of the scale e² within 1e-6; at a thousand times the scale 2se within 1e-3."""
+    """At a thousandth of the scale ρ is e² to 1e-6; at a thousand times the scale it is 2se to 1e-3."""
     assert counted(1.0).cost(np.full((1, 3), 1.001)) == pytest.approx(1e-6, rel=1e-6)
     assert counted(1e-3).cost(np.full((1, 3), 2.0)) == pytest.approx(2e-3, rel=1e-3)
 
 
 @pytest.mark.parametrize("error", [0.01, 0.1, 1.0])
 def test_a_weight_is_half_the_slope_over_the_error(error):
-    """ρ′(e)/(2e) by central differences of 1e-5 e, to 1e-6: what reweighting needs to lower the cost."""
+    """The weight equals ρ′(e)/(2e), by central differences with step 1e-5·e, to 1e-6. Reweighting needs this
+    to reduce the cost."""
     step, pixel = 1e-5 * error, counted(0.1)
     ends = [pixel.cost(np.full((1, 3), 1.0 + error + sign * step)) for sign in (1.0, -1.0)]
     slope = (ends[0] - ends[1]) / (2.0 * step)
@@ -48,7 +49,7 @@ def test_a_weight_is_half_the_slope_over_the_error(error):
 
 
 def test_direct_light_masks_and_without_it_weights_are_those_of_relmse():
-    """Where no direct light falls both terms are relMSE's; under ten times as much, its own is left."""
+    """Without direct light both terms are that of relMSE. Strong direct light removes the second term."""
     random = np.random.default_rng(0)
     reference = random.uniform(0.5, 1.5, (64, 3))
     dark = robust_error(reference, np.zeros_like(reference), reference)
@@ -58,7 +59,7 @@ def test_direct_light_masks_and_without_it_weights_are_those_of_relmse():
 
 
 def test_units_do_not_matter_and_a_black_view_says_nothing():
-    """A thousand times as much light costs the same to 1e-9; a black view nothing."""
+    """A thousand times as much light costs the same to 1e-9. A black view costs nothing."""
     random = np.random.default_rng(1)
     reference, direct, image = (random.uniform(0.1, 1.0, (64, 3)) for _ in range(3))
     small = robust_error(reference, direct, image)
@@ -71,11 +72,11 @@ def test_units_do_not_matter_and_a_black_view_says_nothing():
 
 
 def test_pixels_that_no_parameter_can_mend_do_not_rule_a_fit(gl_context):
-    """One pixel in fifty is black in the reference, as where VPLs leak through a wall.
+    """One pixel in fifty is black in the reference, as if VPLs leaked through a wall.
 
-    relMSE answers by dimming everything by more than 10 %; the robust fit stays within 6 %, and within half
-    of that. It is not 0: a black pixel still pulls ten times as hard as others, for it weighs a hundred times
-    as much.
+    A fit of relMSE dims everything by more than 10 %. The robust fit dims by less than 6 % and by less than
+    half of that. It does not reach 0: a black pixel has a hundred times the weight of others and still pulls
+    ten times as hard.
     """
     runtime = Runtime(colored_room(), TunedConfig(PLANTED, visibility="transmittance"), context=gl_context)
     view = room_view("spot")

@@ -1,4 +1,4 @@
-"""Figures of an image: relative ones have no value where nothing is there to be relative to."""
+"""Metrics of a view in closed form. Relative metrics are NaN against a black reference."""
 
 import math
 from dataclasses import replace
@@ -23,7 +23,7 @@ GREY, BLACK = np.full((4, 3), 0.5, np.float32), np.zeros((4, 3), np.float32)
 
 
 def test_of_a_grey_image():
-    """Half as bright: (0.5 − 0.25)² / (0.5² + 0.01·0.5²) = 0.25/1.01."""
+    """The image is half as bright: (0.5 − 0.25)² / (0.5² + 0.01·0.5²) = 0.25/1.01."""
     assert relmse(0.5 * GREY, GREY) == pytest.approx(0.25 / 1.01)
     assert energy_ratio(0.5 * GREY, GREY) == pytest.approx(0.5)
     assert median_error(0.5 * GREY, GREY) == pytest.approx(0.5)
@@ -38,7 +38,7 @@ def test_against_a_black_reference_there_is_no_value(image):
 
 
 def test_without_the_worst_pixel_in_a_thousand():
-    """2,000 pixels off by 1 %, two of them by a factor of 11: the two hold all but a thousandth of relMSE."""
+    """Of 2,000 pixels, two are off by a factor of 11, the others by 1 %: the two cause 99.9 % of relMSE."""
     reference = np.ones((2000, 3), np.float32)
     image = 1.01 * reference
     image[[7, 1234]] = 11.0
@@ -61,7 +61,7 @@ def test_the_mean_is_over_views_that_have_a_value():
 
 
 def test_flip_compares_light_and_not_textures(gl_context):
-    """A reference with another albedo, as texture filtering gives it, and the same light: FLIP is 0."""
+    """FLIP is 0 if the light is the same and only the reference's albedo differs, as by texture filtering."""
     runtime = Runtime(colored_room(), "default", rsm_resolution=128, context=gl_context)
     view = room_view("spot")
     captured = runtime.capture(view)

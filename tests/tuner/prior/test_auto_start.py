@@ -1,4 +1,4 @@
-"""`auto` where a config is taken: a fit starts from what it sets, and it can be evaluated."""
+"""A config with a prior as the start of a fit, and evaluated."""
 
 import pytest
 from made_priors import made_prior
@@ -14,7 +14,7 @@ CONFIG = TunedConfig(BASE, visibility="maps", auto=made_prior(strength=0.05))
 
 
 def test_a_fit_starts_in_the_middle_of_what_the_prior_set():
-    """Logarithmic where the table is, and everything else as the config has it."""
+    """It is their mean, on the scale of the parameter table. All other parameters come from the config."""
     drawn = [
         ArtistParameters(intensity=value, visibility_bias=bias) for value, bias in ((0.5, 0.01), (2.0, 0.04))
     ]
@@ -27,7 +27,7 @@ def test_a_fit_starts_in_the_middle_of_what_the_prior_set():
 
 @pytest.mark.slow
 def test_evaluate_with_a_prior(tmp_path, monkeypatch):
-    """`tuned` is drawn with what the prior set for each view, and the defaults without it."""
+    """`tuned` is rendered with what the prior sets in each view, `default` without the prior."""
     from pathlib import Path
 
     monkeypatch.setenv("VPLTUNE_CACHE", str(tmp_path))

@@ -1,4 +1,4 @@
-"""A table of a view's loss against the loss itself, and its gradient against differences."""
+"""The loss table of a view against the loss itself, and its gradient against finite differences."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ import pytest
 from built_scenes import colored_room, room_view
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
-from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS, value_at
+from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.metrics.relative_squared_error import target_of, weighted_squared_error
@@ -37,7 +37,7 @@ PARAMETERS = ArtistParameters(vpl_count=32)
 
 @pytest.fixture(scope="module")
 def view(gl_context) -> CapturedView:
-    """The room, and as its reference twice the runtime's own image with other parameters, with noise."""
+    """A room whose reference is the runtime's own image with other parameters, with noise in both halves."""
     gl_context.__enter__()
     truth = replace(PARAMETERS, intensity=1.4, falloff_footprint=1.0)
     runtime = Runtime(
@@ -65,8 +65,8 @@ def table(view) -> LossTable:
 
 
 def direct_loss(view: CapturedView, point: np.ndarray) -> float:
-    """By the gather itself, pair by pair."""
-    values = {n: value_at(parameter_spec(n), float(p)) for n, p in zip(AUTO_PARAMETERS, point, strict=True)}
+    """The loss at a point of the unit cube, by the gather over all pairs."""
+    values = {n: parameter_spec(n).within(float(p)) for n, p in zip(AUTO_PARAMETERS, point, strict=True)}
     parameters = replace(PARAMETERS, **values)
     pixels = view.fitted_pixels(RECEIVERS, 0)
     receivers, vpls = gather_inputs(view.captured, pixels)
@@ -83,7 +83,7 @@ def direct_loss(view: CapturedView, point: np.ndarray) -> float:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_exact_at_nodes(view, table, seed):
-    """At nodes, only the order of summing is between the two."""
+    """At the nodes, only the order of summation differs."""
     random = np.random.default_rng(seed)
     axes = (FOOTPRINT_PLACES, BIAS_PLACES, SOFTNESS_PLACES)
     point = np.array([0.5, *(random.choice(places) for places in axes)], np.float32)
@@ -92,13 +92,13 @@ def test_exact_at_nodes(view, table, seed):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_near_between_them(view, table, seed):
-    """Bias and softness are interpolated linearly between coarse nodes, of a loss that bends: 5 %."""
+    """Between nodes the table is within 5 %: β and σ are interpolated linearly between coarse nodes."""
     point = np.random.default_rng(seed).uniform(LOWEST_POINT, HIGHEST_POINT).astype(np.float32)
     assert float(table_loss(table, point)) == pytest.approx(direct_loss(view, point), rel=5e-2, abs=1e-2)
 
 
 def test_gradient(table):
-    """Against central differences, away from the nodes, where linear pieces have corners."""
+    """The gradient matches central differences, away from the nodes, where the linear pieces have kinks."""
     point = jnp.array([0.52, 0.37, 0.07, 0.6], jnp.float32)
     gradient = jax.grad(lambda p: table_loss(table, p))(point)
     for axis in range(4):

@@ -1,4 +1,4 @@
-"""A scene's captures are kept for as long as they are what would be captured anew."""
+"""Cached captures of a scene are valid only as long as a new capture would give the same."""
 
 from dataclasses import replace
 
@@ -15,7 +15,8 @@ from vpltune.tuner.prior.loss_table import default_point, table_loss
 from vpltune.tuner.prior.scene_generator import generated_scene
 
 MOVES = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.1, 0.2, 0.0], [0.05, -0.1, 0.0, -0.3]], np.float32)
-"""From the defaults."""
+"""Offsets from the default point."""
+# The values under the present `CAPTURE_VERSION`, printed by the test below.
 LOSSES = (0.027439, 0.034081, 0.034132)
 STATISTICS = (
     *(0.9304, 0.37042, 0.11179, 0.53959, 0.58801, 0.54732),
@@ -34,9 +35,8 @@ def test_what_the_runtime_does_otherwise_is_another_capture(monkeypatch):
 
 
 def test_captures_are_those_of_their_version(gl_context, monkeypatch):
-    """What one scene was captured as under `CAPTURE_VERSION`. Should this fail, others' caches hold captures
-    that are no longer true: raise the version, and put the new numbers here. The tolerance is what another
-    driver may round to."""
+    """A capture gives the recorded values. If this fails, users' caches hold outdated captures: increase
+    `CAPTURE_VERSION`, and record the new values here. The tolerance covers the rounding of other drivers."""
     gl_context.__enter__()
     monkeypatch.setattr(prior_library, "ROTATIONS", {32: ((0.0, 0.0),)})
     scene = generated_scene(0)

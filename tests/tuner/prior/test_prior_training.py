@@ -1,4 +1,4 @@
-"""Training on planted losses: what follows from statistics is learnt, and scenes left out are not seen."""
+"""Training on planted losses: a prior learns what follows from the statistics and ignores left-out scenes."""
 
 import dataclasses
 
@@ -19,17 +19,17 @@ from vpltune.tuner.prior.loss_table import (
 from vpltune.tuner.prior.prior_library import PriorScene
 from vpltune.tuner.prior.prior_training import DEFAULT, own_fits, row_losses, train, training_rows
 
-SCENES = 16
-COUNTS = (16, 64)
+SCENES = 16  # a choice
+COUNTS = (16, 64)  # VPL counts, a choice
 
 
 def planted_best(statistics: np.ndarray) -> np.ndarray:
-    """α follows the third statistic, all else stays at the defaults."""
+    """α follows the third statistic; all other parameters stay at the defaults."""
     return default_point(ArtistParameters()) + np.array([0.0, 0.5 * (statistics[2] - 0.4), 0.0, 0.0])
 
 
 def planted_scene(number: int) -> PriorScene:
-    """Bowls about the planted best: loss (k − 1)² + 40 (α − α*)² + 0.05 on every row."""
+    """A scene whose loss has its minimum at k = 1 and α = α*, the planted best, in every row."""
     random = np.random.default_rng(number)
     vpl_count = np.repeat(np.array(COUNTS, np.int32), 4)
     fitted = np.tile([True, True, False, False], len(COUNTS))
@@ -39,7 +39,7 @@ def planted_scene(number: int) -> PriorScene:
     offset = np.array([planted_best(row)[1] for row in statistics])[:, None] - np.array(FOOTPRINT_PLACES)
     bowl = 1.05 + 40.0 * offset**2
     square = np.broadcast_to(1.0 / bowl[..., None, None], shape).astype(np.float32)
-    # A k² − B k + C with A = 1/bowl, B = 2/bowl, C = 1 is least at k = 1, where it is 1 − 1/bowl.
+    # A k² − B k + C with A = 1/bowl, B = 2/bowl, C = 1 has its minimum 1 − 1/bowl at k = 1.
     constant = np.ones(len(vpl_count), np.float32)
     table = LossTable(square, 2.0 * square, constant)
     return PriorScene(f"planted-{number}", statistics, table, table, vpl_count, fitted)
@@ -60,7 +60,7 @@ def test_own_fits_find_the_planted_best(scenes):
 
 
 def test_a_prior_learns_what_follows(scenes):
-    """On scenes new to it, it takes away nine tenths of what the defaults lose to their fits."""
+    """On unseen scenes it removes 90 % of the excess loss of the defaults over the scenes' own fits."""
     rows = training_rows(scenes, own_fits(scenes))
     left_out = np.arange(SCENES) % 2 == np.arange(2)[:, None]
     priors = train(rows, left_out)
@@ -78,7 +78,7 @@ def test_a_prior_learns_what_follows(scenes):
 
 
 def test_what_is_left_out_is_not_seen(scenes):
-    """Another scene in its place, as hard to learn, changes nothing of the prior but its normalisation."""
+    """Replacing a left-out scene's tables by others does not change the prior."""
     left_out = np.zeros((1, SCENES), bool)
     left_out[0, 3] = True
     turned = jax.tree.map(lambda values: values[:, ::-1] if values.ndim > 1 else values, scenes[3].table)

@@ -1,4 +1,4 @@
-"""Generated scenes: what a renderer may ask of any scene, and as varied as a prior needs them."""
+"""Generated scenes are valid, reproducible, and varied."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def test_a_scene_is_whole(number):
 
 @pytest.mark.parametrize("number", NUMBERS)
 def test_camera_and_lamps_stand_inside_and_free(number):
-    """Within the bounds, and not in the middle of a box."""
+    """Camera and lights are within the bounds and not inside a box."""
     scene = generated_scene(number)
     low, high = scene.bounds()
     space = free_space(scene)
@@ -47,7 +47,7 @@ def test_the_same_number_is_the_same_scene():
 
 
 def test_they_differ():
-    """In kind, in light, and in scale by a factor of a hundred at least."""
+    """They differ in kind, in light, and in scale by a factor of at least 100."""
     scenes = [generated_scene(number) for number in range(20)]
     assert {scene.name.split("-")[0] for scene in scenes} == set(KINDS)
     assert {light.kind for scene in scenes for light in scene.lights} == {"spot", "point", "directional"}
@@ -56,7 +56,7 @@ def test_they_differ():
 
 
 def test_the_room_and_the_hall_are_one_space():
-    """Through the door one gets from one into the other."""
+    """A straight path through the doorway is free."""
     space = free_space(room_and_hall())
     way = np.array([[0.0, 1.5, z] for z in np.linspace(3.0, -6.0, 40)])
     assert (space.clearance_at(space.to_voxels(way)) > 0.0).all()

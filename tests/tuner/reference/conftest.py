@@ -1,7 +1,7 @@
-"""Small scenes in plain arrays, and the plain Mitsuba path trace that the estimator is held against.
+"""Small scenes built in code, and a plain Mitsuba path tracer to compare the estimator with.
 
-The path trace shares nothing with the estimator but the rays through the pixel centres: Mitsuba's own shapes,
-`twosided` `diffuse` reflection, textures, emitters and `path` integrator.
+The path tracer shares only the rays through the pixel centres with the estimator. All else is Mitsuba's own:
+shapes, `twosided` `diffuse` reflection, textures, emitters and the `path` integrator.
 """
 
 from dataclasses import replace
@@ -16,14 +16,14 @@ from vpltune.renderer.scene.views import View, ray_directions_world
 
 @pytest.fixture(autouse=True)
 def own_cache_folder(tmp_path_factory, monkeypatch):
-    """One cache for the whole run, away from the user's: the variant is probed once."""
+    """A cache folder of its own for the whole run, so that the variant is probed only once."""
     folder = tmp_path_factory.getbasetemp() / "vpltune-cache"
     monkeypatch.setenv("VPLTUNE_CACHE", str(folder))
     return folder
 
 
 def quad_mesh(corner, edge_u, edge_v, material=0, name="quad") -> Mesh:
-    """A parallelogram; its normal is edge_u × edge_v."""
+    """A parallelogram with the normal edge_u × edge_v."""
     corner, edge_u, edge_v = (np.array(v, np.float64) for v in (corner, edge_u, edge_v))
     normal = np.cross(edge_u, edge_v)
     normal /= np.linalg.norm(normal)
@@ -39,7 +39,7 @@ def quad_mesh(corner, edge_u, edge_v, material=0, name="quad") -> Mesh:
 
 
 def scene_of(meshes, materials, textures=(), name="scene") -> Scene:
-    """Every mesh placed once, where it is."""
+    """A scene with one untransformed instance of each mesh."""
     instances = tuple(Instance(mesh.name, index, np.eye(4)) for index, mesh in enumerate(meshes))
     return Scene(name, tuple(meshes), instances, tuple(materials), tuple(textures))
 
@@ -54,7 +54,7 @@ def view_of(eye, target, lights, size=(8, 8), yfov=0.7) -> View:
 
 
 def box_room(texture: Texture | None = None) -> Scene:
-    """A room of 2 m, open towards +Z, with a red and a green wall, and a block turned by 0.3 in it."""
+    """A room of 2 m, open towards +Z, with a red and a green wall and a block turned by 0.3 rad."""
     white = Material("white", np.array([0.73, 0.7, 0.66], np.float32), None if texture is None else 0)
     red = Material("red", np.array([0.65, 0.05, 0.06], np.float32))
     green = Material("green", np.array([0.12, 0.45, 0.15], np.float32))
@@ -81,7 +81,7 @@ def box_room(texture: Texture | None = None) -> Scene:
 
 
 def box_room_view(size=(32, 24), lights=None) -> View:
-    # Off the axis: else pixel centres see the exact edges where walls meet, where either wall is right.
+    # Off the axis, so that no pixel centre sees the exact edge between two walls, where either wall is right.
     return view_of((0.03, 1.02, 3.9), (0, 1, 0), lights or (spot(), point(), sun()), size, np.radians(37))
 
 
@@ -111,7 +111,7 @@ def sun() -> Light:
 
 @pytest.fixture(scope="session")
 def shapes() -> SimpleNamespace:
-    """The functions above and `plain_path_trace`, for test modules, which import nothing of each other."""
+    """The functions of this file, for test modules, which cannot import it."""
     functions = (
         quad_mesh,
         scene_of,
@@ -129,7 +129,7 @@ def shapes() -> SimpleNamespace:
 
 @pytest.fixture
 def mitsuba():
-    """Mitsuba with the LLVM variant current."""
+    """Mitsuba with its LLVM variant set."""
     from vpltune.tuner.reference.variant import select_variant
 
     if select_variant().name != "llvm_ad_rgb":
@@ -140,7 +140,7 @@ def mitsuba():
 
 
 def plain_path_trace(mi, scene: Scene, view: View, depth: int, samples: int, seed: int):
-    """Radiance at the pixel centres by the stock integrator: mean and variance of the mean, [h, w, 3]."""
+    """Radiance at the pixel centres by Mitsuba's integrator: mean, and variance of the mean, [h, w, 3]."""
     import drjit as dr
 
     stock = mi.load_dict(_stock_scene(mi, scene, view.lights))
@@ -176,7 +176,7 @@ def _stock_mesh(mi, scene: Scene, instance: Instance):
         encoded = texture.texels_srgb / 255.0
         linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
         wraps = {"repeat": "repeat", "mirrored_repeat": "mirror", "clamp_to_edge": "clamp"}
-        assert texture.wrap_u == texture.wrap_v, "Mitsuba's bitmaps wrap both ways alike"
+        assert texture.wrap_u == texture.wrap_v, "Mitsuba's bitmaps have one wrap mode for both directions"
         reflectance = {
             "type": "bitmap",
             "bitmap": mi.Bitmap((linear * material.base_color).astype(np.float32)),
@@ -184,7 +184,7 @@ def _stock_mesh(mi, scene: Scene, instance: Instance):
             "wrap_mode": wraps[texture.wrap_u],
         }
     else:
-        assert (mesh.colors == mesh.colors[0]).all(), "vertex colours are not in the plain scene"
+        assert (mesh.colors == mesh.colors[0]).all(), "the plain scene has no vertex colours"
     properties = mi.Properties()
     properties["bsdf"] = mi.load_dict(
         {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": reflectance}}
@@ -217,8 +217,8 @@ def _stock_emitter(mi, light: Light) -> dict:
         return {"type": "directional", "direction": light.direction_world.tolist(), "irradiance": intensity}
     if light.kind == "point":
         return {"type": "point", "position": light.position_world.tolist(), "intensity": intensity}
-    # Mitsuba's own falloff is linear in the angle; glTF's goes into the emitter's texture instead, which
-    # spans ±tan(cutoff) across the beam, and its own is pushed to the very rim.
+    # Mitsuba's spot falloff is linear in the angle. Push it to the very rim, and put glTF's falloff into the
+    # texture of the emitter, which spans ±tan(cutoff) across the beam.
     size = 2048
     across = ((np.arange(size) + 0.5) / size * 2.0 - 1.0) * np.tan(light.outer_cone)
     cosine = 1.0 / np.sqrt(1.0 + across[None, :] ** 2 + across[:, None] ** 2)

@@ -1,4 +1,4 @@
-"""The estimator against closed forms: where the answer is known without a path tracer."""
+"""The estimator against closed forms."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ DOWN = np.array([0.0, -1.0, 0.0])
 
 @pytest.fixture
 def floor(shapes):
-    """4 m square at y = 0, facing up, reflecting 0.5."""
+    """A square of 4 m at y = 0 that faces up, with reflectance 0.5."""
     return shapes.scene_of([shapes.quad_mesh([-2, 0, -2], [0, 0, 4], [4, 0, 0])], [shapes.gray(0.5)])
 
 
@@ -28,7 +28,7 @@ def test_direct_point_light_is_inverse_square(shapes, floor):
     distance = np.linalg.norm(to_light, axis=-1, keepdims=True)
     expected = light.intensity * to_light[..., 1:2] / distance**3
     assert got.valid.all()
-    # Single precision along the way.
+    # The estimator works in single precision.
     np.testing.assert_allclose(got.direct_irradiance, expected, rtol=1e-5)
 
 
@@ -42,7 +42,7 @@ def test_spot_falloff_is_gltf_s(shapes, floor, inner, outer):
     distance = np.linalg.norm(to_light, axis=-1, keepdims=True)
     cosine = to_light[..., 1:2] / distance
     falloff = np.clip((cosine - np.cos(outer)) / (np.cos(inner) - np.cos(outer)), 0.0, 1.0) ** 2
-    # A hard edge magnifies the rounding of the cosine by 1/(cos inner − cos outer).
+    # A hard edge amplifies the rounding of the cosine by 1/(cos inner − cos outer).
     tolerance = 1e-5 + 1e-6 / (np.cos(inner) - np.cos(outer))
     expected = light.intensity * falloff * cosine / distance**2
     assert got.valid.mean() > 0.8
@@ -60,7 +60,7 @@ def test_directional_light_is_a_cosine(shapes, floor):
 
 @pytest.fixture
 def wall_over_floor(shapes):
-    """A lit square of 0.2 m at y = 1 facing down, over a black floor that faces up; seen from the side."""
+    """A square of 0.2 m at y = 1 that faces down, over a black floor that faces up."""
 
     def make(reflectance=0.8, tilt=0.0):
         half = 0.1
@@ -81,9 +81,9 @@ def patch_form_factor(position: np.ndarray) -> np.ndarray:
 
 
 def test_a_lit_patch_lights_a_black_floor_by_its_form_factor(shapes, wall_over_floor):
-    """E = ρ·E⊥·F, on receivers that themselves reflect nothing."""
+    """E = ρ·E⊥·F, on receivers with albedo 0."""
     light = Light("directional", np.array([2.0, 1.0, 0.5]), direction_world=-DOWN)
-    # From below: the floor must not stand in the beam.
+    # A directional light from below is blocked by the floor.
     scene = wall_over_floor()
     blocked = reference(scene, shapes.view_of((0.1, 0.5, 1.5), (0, 0, 0), [light]))
     assert blocked.irradiance[blocked.valid].max() == 0.0
@@ -91,21 +91,21 @@ def test_a_lit_patch_lights_a_black_floor_by_its_form_factor(shapes, wall_over_f
     light = Light("point", np.array([2.0, 1.0, 0.5]), position_world=np.array([0.0, 1e-3, 0.0]))
     got = reference(scene, shapes.view_of((0.1, 0.5, 1.5), (0, 0, 0), [light], yfov=0.3), max_samples=16384)
     assert got.valid.all() and (got.albedo == 0.0).all()
-    # The patch is 0.2 m wide and 1 m away: its irradiance is I/d² within 2 %, uniform enough.
+    # The patch is 0.2 m wide and 1 m away, so its irradiance is I/d² within 2 %.
     expected = 0.8 * light.intensity * patch_form_factor(got.position_world)[..., None]
     assert got.irradiance.mean() == pytest.approx(expected.mean(), rel=0.02)
     np.testing.assert_allclose(got.irradiance.mean(axis=2), expected.mean(axis=2), rtol=0.06)
 
 
 def test_surfaces_are_two_sided_but_light_does_not_pass_through(shapes, wall_over_floor):
-    """The patch is turned over, then lit from its far side: the first changes nothing, the second all."""
+    """Flipping the patch changes nothing. Lighting it from its far side leaves the floor in shadow."""
     light = Light("point", np.array([1.0, 1.0, 1.0]), position_world=np.array([0.0, 0.5, 0.0]))
     view = shapes.view_of((0.1, 0.5, 1.5), (0, 0, 0), [light])
     scene = wall_over_floor()
     patch = scene.meshes[1]
     turned = replace(patch, normals=-patch.normals, triangles=patch.triangles[:, ::-1].copy())
     over = replace(scene, meshes=(scene.meshes[0], turned))
-    # The turned triangles name their corners in another order, so they round differently.
+    # The flipped triangles list their corners in another order, so they round differently.
     np.testing.assert_allclose(
         reference(scene, view).irradiance_a, reference(over, view).irradiance_a, rtol=1e-4
     )
@@ -128,7 +128,7 @@ def test_a_floor_seen_from_below_is_lit_from_below(shapes, floor):
 
 
 def ball(shapes, reflectance):
-    """A sphere of radius 1 about the origin with its true normals, 32 × 64 quads."""
+    """A sphere of radius 1 about the origin, 32 × 64 quads, with the exact normals of the sphere."""
     polar = np.linspace(0.0, np.pi, 33)
     around = np.linspace(0.0, 2.0 * np.pi, 65)
     points = np.stack(
@@ -157,27 +157,27 @@ def ball(shapes, reflectance):
 
 @pytest.mark.parametrize(("bounces", "series"), [(1, 0.5), (2, 0.75), (None, 1.0)])
 def test_a_furnace_gives_the_geometric_series(shapes, bounces, series):
-    """Inside a ball lit from its centre E_direct = I everywhere, one bounce is ρ·I, all are ρ/(1 − ρ)·I.
+    """Inside a sphere lit from its centre, E_direct = I. One bounce gives ρ·I, all together ρ/(1 − ρ)·I.
 
-    With ρ = 1/2: 1/2, 3/4 for two, and 1.
+    For ρ = 1/2 that is I/2 for one bounce, 3/4·I for two, and I for all.
     """
     light = Light("point", np.array([2.0, 3.0, 4.0]))
     view = shapes.view_of((0.3, 0.1, 0.2), (-1, 0.3, 0), [light], size=(16, 16))
     got = reference(ball(shapes, 0.5), view, bounces=bounces, max_samples=256)
     assert got.valid.all()
-    # The facets lie inside the sphere by up to 1 − cos(π/64) both ways, 0.24 % of the radius, so that
-    # irradiance exceeds I by up to 0.5 %, and by as much again where it is reflected.
+    # The facets are inside the sphere, by up to 1 − cos(π/64) in both directions, 0.24 % of the radius. So
+    # the irradiance exceeds I by up to 0.5 %, and by as much again after a reflection.
     np.testing.assert_allclose(got.direct_irradiance.mean(axis=(0, 1)), light.intensity, rtol=5e-3)
     np.testing.assert_allclose(got.irradiance.mean(axis=(0, 1)), series * light.intensity, rtol=1e-2)
 
 
 def test_shading_normals_are_the_file_s_own(shapes):
-    """On a faceted ball E_direct follows the interpolated normal, which no facet's own normal does."""
+    """On a faceted sphere, E_direct follows the interpolated normals and not those of the facets."""
     light = shapes.sun()
     got = reference(ball(shapes, 0.5), shapes.view_of((0, 0, 4), (0, 0, 0), [light], (32, 32), 0.3))
     radial = got.position_world / np.linalg.norm(got.position_world, axis=-1, keepdims=True)
     inside = got.valid & (radial[..., 2] > 0.5)
-    # Interpolated normals of a facet 0.1 wide differ from the radial ones by less than 0.1²/8.
+    # On a facet 0.1 wide, the interpolated and the radial normal differ by less than 0.1²/8.
     np.testing.assert_allclose(got.normal_world[inside], radial[inside], atol=2e-3)
     expected = np.maximum(got.normal_world @ -light.direction_world, 0.0)[..., None] * light.intensity
     lit = inside & (expected[..., 0] > 0.1)
@@ -192,15 +192,15 @@ def texel_albedo(texture: Texture, row: int, column: int) -> np.ndarray:
 @pytest.mark.parametrize("wrap_u", ["repeat", "mirrored_repeat", "clamp_to_edge"])
 @pytest.mark.parametrize("wrap_v", ["repeat", "mirrored_repeat", "clamp_to_edge"])
 def test_texture_wraps_each_way_by_its_own_mode_with_v_down(shapes, wrap_u, wrap_v):
-    """Four by two texels, uv from −1.5 to 2.5: pixels at texel centres show exactly that texel."""
+    """A texture of 4 × 2 texels on a quad with uv from −1.5 to 2.5."""
     texels = np.random.default_rng(1).integers(0, 256, (2, 4, 3), dtype=np.uint8)
     texture = Texture("checker", texels, wrap_u, wrap_v)
     quad = shapes.quad_mesh([0, 0, 0], [4, 0, 0], [0, 4, 0])
-    # v grows downwards in the image, as rows do.
+    # v increases downwards in the image, like the rows.
     uv = np.array([[-1.5, 2.5], [2.5, 2.5], [2.5, -1.5], [-1.5, -1.5]], np.float32)
     factor = np.array([0.9, 0.8, 0.7], np.float32)
     scene = shapes.scene_of([replace(quad, uv=uv)], [Material("painted", factor, 0)], [texture])
-    # 16 × 16 pixels over the quad: 4 pixels a unit of u and v, so rows see v at odd eighths.
+    # The quad covers 16 × 16 pixels, 4 for each unit of u and v, so the rows see v at odd eighths.
     view = shapes.view_of((2, 2, 2), (2, 2, 0), [shapes.sun()], (16, 16), np.pi / 2)
     got = reference(scene, view, max_samples=1)
 
@@ -215,8 +215,8 @@ def test_texture_wraps_each_way_by_its_own_mode_with_v_down(shapes, wrap_u, wrap
     for row in range(16):
         v = -1.5 + (row + 0.5) / 4.0
         for column in range(16):
-            # Texels are a pixel wide along u: centre falls on centre. Along v they are two pixels high,
-            # and a pixel's centre lies a quarter texel off: a blend of 3 to 1.
+            # Along u a texel is one pixel wide and the centres coincide. Along v it is two pixels high, and
+            # the centre of a pixel is a quarter texel off, which blends two texels 3 to 1.
             i = wrapped(int(np.floor((-1.5 + (column + 0.5) / 4.0) * 4.0)), 4, wrap_u)
             place = v * 2.0 - 0.5
             weight = place - np.floor(place)
@@ -240,7 +240,7 @@ def test_vertex_colours_multiply_the_base_colour(shapes):
 
 
 def test_misses_and_coordinates_without_a_fraction_read_inside_the_texture(shapes):
-    """A table read outside its bounds would end the process."""
+    """A read outside the bounds of a table would crash the process."""
     texture = Texture("one", np.full((8, 8, 3), 255, np.uint8))
     quad = shapes.quad_mesh([-1, -1, 0], [2, 0, 0], [0, 2, 0])
     for size in (1.0, 1e9, 3e38):

@@ -1,4 +1,4 @@
-"""The estimator against a plain Mitsuba path trace: depth 3 minus depth 2, at the same pixels."""
+"""The estimator against a plain Mitsuba path trace, depth 3 minus depth 2, at the same pixels."""
 
 import numpy as np
 import pytest
@@ -9,18 +9,19 @@ from vpltune.renderer.scene.views import View
 from vpltune.tuner.reference import reference_views
 
 SIGNIFICANCE = 0.01
+"""Probability of a false alarm in an image, of all pixel tests together. A choice."""
 SHARE_THAT_PASSES = 0.9975
-
+"""Share of the pixels that must pass. A choice."""
 
 SAMPLES_PER_ROUND = 2048
+"""Samples per pixel of one plain path trace. A choice."""
 
 
 def z_scores(mitsuba, shapes, scene: Scene, view: View, rounds: int):
-    """Per valid pixel and channel: difference of reflected radiance over its standard deviation, and the
-    ratio of the totals.
+    """The z-score of the reflected radiance of each valid pixel and channel, and the ratio of the totals.
 
-    At thousands of samples a pixel's mean is normal enough for a test so far out in the tail: at 500, pixels
-    that see a small bright patch fail it by their skewness alone.
+    With thousands of samples the mean of a pixel is close enough to normal for a test this far out in the
+    tail. With 500, pixels that see a small bright patch fail because of their skewness alone.
     """
     ours = reference_views(scene, (view,), noise_target=0.0, max_samples=2048)[0]
     valid = ours.valid
@@ -33,22 +34,22 @@ def z_scores(mitsuba, shapes, scene: Scene, view: View, rounds: int):
             plain += sign * mean[valid] / rounds
             variance += of_mean[valid] / rounds**2
     reflected = (ours.irradiance * ours.albedo / np.pi)[valid]
-    # Half the squared difference of two halves is, on average, the variance of one: here as a share of the
-    # plain one, over the whole image.
+    # A quarter of the squared difference of the halves has the variance of our mean as its expectation. Over
+    # the whole image it is added as a share of the plain variance.
     own = ((ours.irradiance_a - ours.irradiance_b) * ours.albedo / np.pi)[valid] ** 2 / 4.0
-    # A thousandth of the mean: for nearly black pixels that a handful of plain paths have lit, if any, whose
-    # variance is therefore not known. Plain means of 16 million samples, made once for three such pixels
-    # of godot-living-room, agreed with ours to 1 %, where 4,096 samples were at a quarter to a half of it.
+    # Add a thousandth of the mean for nearly black pixels. Few plain paths, if any, reach them, so their
+    # variance is unknown. For three such pixels of godot-living-room, plain means of 16 million samples
+    # agreed with ours to 1 %, while means of 4,096 samples were a quarter to a half of it.
     variance = variance * (1.0 + own.sum() / variance.sum()) + (1e-3 * reflected.mean()) ** 2
     return (plain - reflected) / np.sqrt(variance), plain.sum() / reflected.sum()
 
 
 def check(scores: np.ndarray, ratio: float) -> None:
-    # Šidák (1967): as many tests as there are pixels and channels, one false alarm in a hundred images.
+    # Šidák (1967): one test for each pixel and channel, with one false alarm in a hundred images.
     threshold = norm.isf((1.0 - (1.0 - SIGNIFICANCE) ** (1.0 / scores.size)) / 2.0)
     passed = np.mean((np.abs(scores) < threshold).all(axis=1))
     assert passed >= SHARE_THAT_PASSES, f"{passed:.4%} of pixels pass, largest z {np.abs(scores).max():.1f}"
-    # All pixels together are a sharper test than any alone: their energy is known to 0.1 % here.
+    # All pixels together are a sharper test than any single one: their energy is known to 0.1 % here.
     assert ratio == pytest.approx(1.0, abs=0.005)
 
 
@@ -74,7 +75,7 @@ def test_textured_box_room(mitsuba, shapes):
 
 
 def test_the_check_sees_what_is_wrong(mitsuba, shapes):
-    """A light one percent too strong fails by the energy, one pixel in 200 that is off by its shares."""
+    """The check fails if the light is 1 % too strong, and if one pixel in 200 is off."""
     view = shapes.box_room_view((40, 30), (shapes.point(),))
     scores, ratio = z_scores(mitsuba, shapes, shapes.box_room(), view, rounds=1)
     with pytest.raises(AssertionError, match="comparison failed"):
@@ -118,5 +119,5 @@ def test_scenes_that_others_made(
     direction = np.array(direction) / np.linalg.norm(direction)
     light = shapes.spot(position_world=np.array(position, float), direction_world=direction)
     view = shapes.view_of(eye, target, [light], (40, 30), np.radians(degrees))
-    # More than elsewhere: much of a furnished room is dark, where few plain paths find the light.
+    # More rounds than elsewhere: much of a furnished room is dark, and few plain paths find the light.
     check(*z_scores(mitsuba, shapes, read_scene(path), view, rounds=10))

@@ -1,4 +1,4 @@
-"""What a reference promises: the same bits again, independent halves, known noise, any scale."""
+"""References: reproducible bit for bit, independent halves, known noise, independent of scale, cached."""
 
 import os
 import pickle
@@ -51,7 +51,7 @@ def test_sampling_stops_at_the_noise_target(shapes):
 
 
 def test_noise_floor_is_the_error_of_the_mean(shapes):
-    """Against far more samples, the relMSE of the mean is what the halves alone foretell."""
+    """The relMSE against a reference with far more samples matches the prediction from the two halves."""
     scene, view = shapes.box_room(), shapes.box_room_view()
     truth = reference_views(scene, (view,), seed=1, noise_target=0.0, max_samples=4096)[0]
     valid = truth.valid
@@ -61,12 +61,12 @@ def test_noise_floor_is_the_error_of_the_mean(shapes):
         got = reference_views(scene, (view,), seed=seed, noise_target=0.0, max_samples=32)[0]
         measured.append(np.mean((got.irradiance - truth.irradiance)[valid] ** 2 / scale))
         foretold.append(noise_floor(got))
-    # The mean over eight seeds and 500 pixels; both scatter by some 10 %.
+    # Means over eight seeds and 500 pixels; each scatters by some 10 %.
     assert np.mean(measured) == pytest.approx(np.mean(foretold), rel=0.25)
 
 
 def test_halves_are_independent(shapes):
-    """The errors of A and B, over pixels and seeds, do not go together."""
+    """The errors of both halves are uncorrelated over pixels and seeds."""
     scene, view = shapes.box_room(), shapes.box_room_view((16, 12))
     truth = reference_views(scene, (view,), seed=1, noise_target=0.0, max_samples=4096)[0]
     errors = []
@@ -76,7 +76,7 @@ def test_halves_are_independent(shapes):
             [(half - truth.irradiance)[truth.valid][:, 1] for half in (got.irradiance_a, got.irradiance_b)]
         )
     a, b = np.array(errors).transpose(1, 0, 2).reshape(2, -1)
-    # 1,500 pairs: a correlation of independent numbers stays within 4/√1500.
+    # Over 1,500 pairs of independent numbers, the correlation stays within 4/√1500.
     assert abs(np.corrcoef(a, b)[0, 1]) < 4.0 / np.sqrt(a.size)
 
 
@@ -88,7 +88,7 @@ def test_scale_changes_nothing(shapes, factor):
         scaled(scene, factor), (scaled_view(view, factor),), noise_target=0.0, max_samples=64
     )[0]
     assert np.array_equal(base.valid, other.valid)
-    # The same rays but for rounding in the last place, which lets a sample or two see past an edge.
+    # The rays are the same up to rounding in the last place, which lets a sample or two miss an edge.
     for name in ("irradiance_a", "irradiance_b", "direct_irradiance"):
         error = np.abs(getattr(other, name) - getattr(base, name)) / (base.irradiance.mean())
         assert np.mean(error) < 1e-4, name
@@ -102,7 +102,7 @@ def test_kept_references_are_found_without_mitsuba(shapes, monkeypatch, tmp_path
     made = reference_views(scene, (view,), **arguments)[0]
     monkeypatch.setattr("vpltune.tuner.reference.references._rendered", None)
     assert same(made, reference_views(scene, (view,), **arguments)[0])
-    # Names are no part of what a reference is made from.
+    # Names do not enter the key.
     renamed = replace(scene, name="another name")
     assert same(made, reference_views(renamed, (replace(view, name="other"),), **arguments)[0])
 
@@ -154,7 +154,7 @@ def test_damaged_entries_are_made_again(shapes, monkeypatch, tmp_path, damage, c
     if damage == "flipped":
         data[len(data) // 2] ^= 1
     others = {"truncated": data[: len(data) // 2], "flipped": data, "zeroed": bytes(len(data)), "empty": b""}
-    # Whole and right, but of another view.
+    # "swapped" replaces the entry by a valid one of another reference.
     reference_views(scene, (view,), **arguments | {"seed": 1})
     (other,) = set((tmp_path / "references").iterdir()) - {entry}
     entry.write_bytes(others.get(damage, other.read_bytes()))
@@ -170,7 +170,7 @@ def test_a_folder_that_cannot_be_written_is_no_error(shapes, monkeypatch, tmp_pa
     no_cache(monkeypatch, tmp_path / "file")
     scene, view = shapes.box_room(), shapes.box_room_view((8, 6))
     assert reference_views(scene, (view,), noise_target=0.0, max_samples=16)[0].samples == 16
-    assert "not kept" in caplog.text
+    assert "not cached" in caplog.text
 
 
 def test_old_entries_go_when_the_cache_is_full(shapes, monkeypatch, tmp_path):
@@ -211,7 +211,7 @@ def test_arguments_out_of_range_are_refused(shapes, bad):
 
 
 def test_scalar_fallback_agrees_within_noise(shapes, tmp_path):
-    """A process without LLVM traces the same rays: the same randomisation, so far closer than noise."""
+    """Without LLVM, the same rays with the same randomisation are traced: results agree far below noise."""
     scene, view = shapes.box_room(), shapes.box_room_view((16, 12))
     arguments = {"seed": 3, "noise_target": 0.0, "max_samples": 32, "bounces": 2}
     base = reference_views(scene, (view,), **arguments)[0]
@@ -233,13 +233,13 @@ def test_scalar_fallback_agrees_within_noise(shapes, tmp_path):
         np.testing.assert_allclose(made["direct"], base.direct_irradiance, atol=1e-4)
         mean = base.irradiance.mean()
         for name, half in (("a", base.irradiance_a), ("b", base.irradiance_b)):
-            # Rounding lets a few of the 32 samples of a few pixels see past an edge.
+            # Because of rounding, a few of the 32 samples miss an edge in a few pixels.
             assert np.mean(np.abs(made[name] - half)) < 0.005 * mean
 
 
 @pytest.mark.parametrize("count", [2, pytest.param(8, marks=pytest.mark.slow)])
 def test_processes_make_a_reference_once(shapes, tmp_path, count):
-    """All start at once on the same view; one renders, the others wait and find it."""
+    """All processes start at once on the same view. One renders; the others wait and load its result."""
     (tmp_path / "job").write_bytes(pickle.dumps((shapes.box_room(), shapes.box_room_view((32, 24)))))
     program = (
         "import pickle, sys; from vpltune.tuner.reference import references;"
@@ -264,7 +264,7 @@ def test_processes_make_a_reference_once(shapes, tmp_path, count):
 
 
 def test_a_killed_renderer_hands_over_and_leaves_nothing(shapes, tmp_path):
-    """It is killed while it writes; the next makes the reference, and takes the torn file away."""
+    """A process is killed while it writes. The next renders the reference and deletes the partial file."""
     scene, view = shapes.box_room(), shapes.box_room_view((8, 6))
     (tmp_path / "job").write_bytes(pickle.dumps((scene, view)))
     program = (
@@ -286,7 +286,7 @@ def test_a_killed_renderer_hands_over_and_leaves_nothing(shapes, tmp_path):
 
 
 def test_a_lock_that_was_unlinked_under_a_waiting_process_keeps_others_off(monkeypatch, tmp_path):
-    """The second to come waits on a file that goes; it must not work beside the third, with a new one."""
+    """The second thread waits on a file that is unlinked. It must not run beside the third, on a new file."""
     no_cache(monkeypatch, tmp_path)
     order = []
 

@@ -1,4 +1,4 @@
-"""The point set is Sobol's, and scrambling leaves its evenness and takes its bias."""
+"""The points are Sobol' points, and scrambling keeps them even and makes them unbiased."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from vpltune.tuner.reference.sobol import hashed, owen_scrambled, reversed_sobol
 
 @pytest.fixture
 def numpy_arrays(monkeypatch):
-    """The numpy twin's arithmetic, without a scene."""
+    """The arithmetic of `NumpyWavefront`, without a scene."""
     pytest.importorskip("mitsuba").set_variant("scalar_rgb")
     from vpltune.tuner.reference.numpy_wavefront import NumpyWavefront
 
@@ -27,14 +27,14 @@ def bits_reversed(values: np.ndarray) -> np.ndarray:
 def test_points_are_sobol_s():
     ours = bits_reversed(reversed_sobol_points(0, 256).ravel()).reshape(-1, 2) / 2.0**32
     with_scipy = qmc.Sobol(2, scramble=False).random(256)
-    # SciPy walks the same nets in Gray-code order.
+    # SciPy returns the same points in Gray-code order.
     assert {tuple(p) for p in ours} == {tuple(p) for p in with_scipy}
     assert np.array_equal(reversed_sobol_points(100, 50), reversed_sobol_points(0, 150)[100:])
 
 
 @pytest.mark.parametrize("seed", [0, 1, 0xDEADBEEF])
 def test_scrambled_points_fill_every_cell_of_every_elementary_grid(numpy_arrays, seed):
-    """A (0, 8, 2)-net stays one: each dyadic box of area 2⁻⁸ holds one point of 256."""
+    """They remain a (0, 8, 2)-net: each dyadic box of area 2⁻⁸ holds one of the 256 points."""
     points = reversed_sobol_points(0, 256)
     x, y = (
         owen_scrambled(numpy_arrays, points[:, k], np.array([seed + 77 * k], np.uint32)) for k in range(2)
@@ -46,12 +46,12 @@ def test_scrambled_points_fill_every_cell_of_every_elementary_grid(numpy_arrays,
 
 
 def test_one_point_is_uniform_over_seeds(numpy_arrays):
-    """Without bias: each point alone, over seeds, covers [0, 1) evenly."""
+    """Over many seeds, each single point is uniform in [0, 1)."""
     seeds = np.random.default_rng(0).integers(0, 2**32, 40000, dtype=np.uint32)
     for index in (0, 1, 37):
         values = owen_scrambled(numpy_arrays, np.array([index], np.uint32), seeds)
         counts, _ = np.histogram(values, 16, (0.0, 1.0))
-        # χ² with 15 degrees of freedom passes 37.7 once in a thousand.
+        # χ² with 15 degrees of freedom exceeds 37.7 once in a thousand.
         assert np.sum((counts - 2500.0) ** 2 / 2500.0) < 37.7
     assert (
         np.abs(np.corrcoef(hashed(numpy_arrays, np.arange(40000, dtype=np.uint32), seeds), values)[0, 1])
@@ -69,7 +69,7 @@ def test_directions_have_the_moments_of_their_densities(numpy_arrays, axis):
     disc = disc_point(numpy_arrays, axis, u, v)
     for unit in (cosine, cone):
         np.testing.assert_allclose(np.linalg.norm(unit, axis=0), 1.0, atol=1e-6)
-    # Means about the axis: 2/3 for cos θ/π, (1 + 0.3)/2 for the cone; across it all cancels.
+    # The mean along the axis is 2/3 for cos θ/π and (1 + 0.3)/2 for the cone. Across the axis it is 0.
     np.testing.assert_allclose(cosine.mean(axis=1), axis[:, 0] * 2 / 3, atol=1e-3)
     np.testing.assert_allclose(cone.mean(axis=1), axis[:, 0] * 0.65, atol=1e-3)
     assert (axis[:, 0] @ cone).min() >= 0.3 - 1e-6

@@ -1,4 +1,4 @@
-"""Scenes that cannot be traced are refused before Mitsuba, which would crash on them, sees them."""
+"""Unit space, and the rejection of scenes on which Mitsuba would crash."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The Mitsuba variant is tried where an abort does no harm, and the answer is kept."""
+"""The Mitsuba variant is tried in a child process, and the result is cached."""
 
 import subprocess
 import sys
@@ -21,7 +21,7 @@ def nothing_remembered(monkeypatch, tmp_path):
 
 
 def probe_that(monkeypatch, works_on, *, aborts=True):
-    """A stand-in for the probe: it works on one library and dies by SIGABRT, or hangs, on others."""
+    """Replaces the probe: it works with one library and aborts or hangs with others. Returns those tried."""
     tried = []
 
     def run(command, *, env, capture_output, timeout):

@@ -40,7 +40,7 @@ def test_screen(screen_between_floors, factor):
 
 
 def test_points_of_one_convex_room_see_each_other(shapes):
-    """No surface hides the points on it, however near they are to a corner."""
+    """No surface occludes its own points, however close they are to a corner."""
     scene = shapes.scene_of(
         [
             shapes.quad_mesh([0, 0, 0], [0, 0, 1], [1, 0, 0], name="floor"),
@@ -54,7 +54,7 @@ def test_points_of_one_convex_room_see_each_other(shapes):
     wall = np.column_stack([np.zeros(400), near, rng.uniform(0.01, 0.99, 400)])
     got = ray_traced_visibility(scene, floor, np.tile(UP, (400, 1)), wall, np.tile([1.0, 0.0, 0.0], (400, 1)))
     assert got.all()
-    # Turned away, neither sees the other.
+    # With the normals of the floor reversed, no pair sees each other.
     assert not ray_traced_visibility(
         scene, floor, np.tile(-UP, (400, 1)), wall, np.tile([1.0, 0.0, 0.0], (400, 1))
     ).any()
@@ -62,7 +62,7 @@ def test_points_of_one_convex_room_see_each_other(shapes):
 
 @pytest.mark.parametrize(("receivers", "vpls"), [(1, 1), (3, 5), (7, 9), (1, 17)])
 def test_pairs_that_fill_no_whole_packet(screen_between_floors, receivers, vpls):
-    """A processor takes 4 to 16 lanes at once; those past the last pair must not end the process."""
+    """A processor runs 4 to 16 lanes at once. Padding lanes after the last pair must not crash it."""
     left = np.linspace(-1.9, -0.1, receivers)[:, None] * [1.0, 0.0, 0.0]
     above = np.linspace(-1.9, -0.1, vpls)[:, None] * [1.0, 0.0, 0.0] + 2.0 * UP
     got = ray_traced_visibility(

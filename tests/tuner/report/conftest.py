@@ -1,4 +1,4 @@
-"""One real fit, small, and one browser, for all tests of pages."""
+"""Fixtures: one small real fit and one browser, shared by all tests of pages."""
 
 import shutil
 from pathlib import Path
@@ -14,7 +14,7 @@ SCENE = Path(__file__).resolve().parents[3] / "configs" / "scenes" / "cornell-bo
 
 @pytest.fixture(scope="session")
 def fitted_folder(tmp_path_factory) -> Path:
-    """What `vpltune fit` leaves of the shipped Cornell box, with few VPLs and pixels."""
+    """The output of `vpltune fit` for the shipped Cornell box, with few VPLs and pixels."""
     from vpltune.tuner.scene_fit.fit_scene import FitOptions, fit_scene
 
     folder = tmp_path_factory.mktemp("report") / "fit"
@@ -26,7 +26,7 @@ def fitted_folder(tmp_path_factory) -> Path:
 
 @pytest.fixture
 def fit_copy(fitted_folder, tmp_path) -> Path:
-    """A copy that a test may change."""
+    """A copy of `fitted_folder` that a test may change."""
     return Path(shutil.copytree(fitted_folder, tmp_path / "fit"))
 
 

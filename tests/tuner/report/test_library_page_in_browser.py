@@ -1,4 +1,4 @@
-"""A library's page in a real browser: sorted, filtered, linked, by mouse and keyboard, within its size."""
+"""The page of a library in a real browser: sorting, filtering, links, mouse, keyboard, print and size."""
 
 import json
 import shutil
@@ -50,7 +50,7 @@ TUNED = {"hall.glb": (0.5, 0.3, 2.0), "cellar.glb": (2.0, 0.9, 30.0), "attic.glb
 
 
 def made_batch(folder, fitted_folder):
-    """What `vpltune batch` leaves: three scenes tuned, and one of every other fate."""
+    """The output folder of a batch: three tuned scenes, and others with every other status."""
     records = Records(folder)
     for name, (default, tuned, seconds) in TUNED.items():
         output = f"scenes/{name.removesuffix('.glb')}"
@@ -77,15 +77,15 @@ def made_batch(folder, fitted_folder):
 
 @pytest.fixture
 def batch_folder(fitted_folder, tmp_path):
-    """One that a test may change."""
+    """A batch folder that a test may change."""
     return made_batch(tmp_path / "batch", fitted_folder)
 
 
 @pytest.fixture(scope="module")
 def library(fitted_folder, tmp_path_factory):
-    """The page of one that no test changes."""
+    """The page of a batch folder that no test changes."""
     folder = made_batch(tmp_path_factory.mktemp("library") / "batch", fitted_folder)
-    # Two scenes have no readable fit: what could be read is written, and the exit code says so.
+    # Two scenes have no readable fit. The command writes the others and returns 4, "partly done".
     assert run(["report", str(folder)]) == 4
     return folder / "index.html"
 
@@ -133,7 +133,7 @@ def test_headings_sort_both_ways_by_mouse_and_by_keyboard(chromium, library):
         assert names_in(page) == ["hall.glb", "cellar.glb", "attic.glb"]
         assert page.inner_text("[role=status]") == "Sorted by scene, descending"
         page.locator("#untuned thead th", has_text="attempts").locator("button").click()
-        # The scene that waits has no attempts: what has no value stays last.
+        # The waiting scene has no attempts, and rows without a value come last.
         assert names_in(page, "#untuned")[0] in ("slow.glb", "unlit.glb")
         assert names_in(page, "#untuned")[-1] == "later.glb"
         page.locator("#untuned thead th", has_text="attempts").locator("button").click()
@@ -161,7 +161,7 @@ def test_a_scene_links_to_its_page_and_back(chromium, library):
         shown.drawn("image 0")
         assert shown.page.inner_text("h1") == "cellar.glb"
         shown.page.click("text=Library")
-        # A fit that had nothing to fit has a page as well.
+        # An unlit scene has a page too.
         assert shown.page.locator("#untuned a").get_attribute("href") == "scenes/unlit/report.html"
         assert shown.page.inner_text("h1") == "Scene library"
         assert shown.problems == []
@@ -222,7 +222,7 @@ def test_a_listing_that_is_none_is_refused(batch_folder, capfd):
 
 
 def test_a_large_library_stays_within_the_pages_size(tmp_path):
-    """Thumbnails go first, then the best scenes; both are said."""
+    """The page drops thumbnails first, then the best scenes, and says how many it left out."""
     thumbnail = "data:image/jpeg;base64," + "A" * 4000
     row = TunedRow(
         name="",
@@ -244,5 +244,5 @@ def test_a_large_library_stays_within_the_pages_size(tmp_path):
     assert 0.5 * MAXIMUM_PAGE_BYTES < len(page.encode("utf-8")) < MAXIMUM_PAGE_BYTES
     assert "rooms/09999.glb" in page
     assert "rooms/00000.glb" not in page
-    assert "more scenes, all better than these" in page
+    assert "more tuned scenes, all better than these" in page
     assert "more are not listed" in page

@@ -1,4 +1,4 @@
-"""What pages are put together from: axes, words, maps, drawings, rows."""
+"""The parts of a page: axes, formatted values, error maps, charts, parameter rows."""
 
 import io
 import math
@@ -47,7 +47,7 @@ def test_a_number_in_words_is_short_and_close(value):
     assert len(text) <= 14
     plain = text.translate(str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789")).replace(" ", "")
     mantissa, _, exponent = plain.partition("×10")
-    # Three significant digits: half a unit of the third.
+    # Rounding to three significant digits errs by half a unit of the third.
     assert float(f"{mantissa}e{exponent or 0}") == pytest.approx(value, rel=5.1e-3, abs=0.0)
 
 
@@ -97,7 +97,8 @@ def test_an_axis_holds_its_values_and_keeps_the_rest_at_its_ends():
 
 def test_the_tone_curve_keeps_black_and_grey_and_never_exceeds_white():
     assert not tone_curve(np.zeros((1, 1, 3))).any()
-    # Below the shoulder an even surface loses 0.04 and nothing else (Khronos PBR Neutral, 2024).
+    # Below the shoulder, the curve subtracts 0.04 from grey and does nothing else (Khronos PBR Neutral,
+    # 2024).
     np.testing.assert_allclose(tone_curve(np.full((1, 1, 3), 0.5)), 0.46)
     ramp = tone_curve(np.geomspace(1e-4, 1e6, 300)[:, None] * np.ones(3))
     assert (np.diff(ramp[:, 0]) >= 0.0).all()
@@ -105,7 +106,7 @@ def test_the_tone_curve_keeps_black_and_grey_and_never_exceeds_white():
 
 
 def test_the_tone_curve_is_the_runtimes(gl_context):
-    """Twin: shaders/display/tone_mapping.comp. One step of 255, where rounding falls to the other side."""
+    """Twin: shaders/display/tone_mapping.comp. Rounding may differ by one of 255 steps."""
     from pathlib import Path
 
     from vpltune.renderer.frame.runtime import Runtime
@@ -129,7 +130,7 @@ def test_signed_error_has_the_sign_of_the_error_and_the_scale_of_relmse():
     assert not darker[~valid].any()
     grey = random.random((20, 30, 1)) * np.ones(3)
     error = signed_error(grey, reference, valid)[valid]
-    # On grey images luminance is every channel, and the mean square is relMSE itself.
+    # In grey images, luminance equals each channel, so the mean square is relMSE itself.
     assert np.mean(error**2) == pytest.approx(relmse(grey[valid], reference[valid]), rel=1e-9)
 
 
@@ -194,7 +195,7 @@ def test_a_front_is_drawn_from_fast_to_slow_with_ceiling_and_budget():
     assert len(chart.line) == 2
     assert chart.line[0][0] < chart.line[1][0]
     assert chart.line[0][1] < chart.line[1][1] < chart.levels[0][0]
-    assert [mark.label for mark in chart.marks] == ["asked for 4 ms"]
+    assert [mark.label for mark in chart.marks] == ["budget 4 ms"]
     assert pareto_chart([], 0.05, None) is None
 
 
@@ -238,7 +239,7 @@ def test_uncertainty_is_an_interval_a_source_and_what_it_trades_with():
     rows = {row.name: row for row in parameter_rows(ArtistParameters().as_dict(), doubt)}
     left, width = rows["intensity"].bar.interval
     assert left < rows["intensity"].bar.value < left + width
-    # The whole range: from end to end of the bar.
+    # The interval is the whole range, so it spans the bar from end to end.
     assert rows["falloff_footprint"].bar.interval == (5.0, BAR_WIDTH - 10.0)
     assert rows["intensity"].source == "the scene"
     assert rows["falloff_footprint"].source == "the prior"
@@ -250,4 +251,4 @@ def test_parameters_of_another_version_are_told_as_they_are():
     rows = parameter_rows({"intensity": None, "swagger": 2.0}, {})
     assert [(row.name, row.value) for row in rows] == [("intensity", NONE), ("swagger", "2")]
     assert rows[0].bar is None
-    assert rows[1].source == "not in this version's table"
+    assert rows[1].source == "unknown to this version"

@@ -1,4 +1,4 @@
-"""A fit's page in a real browser: images, slider, exposure, keys, print, dark, narrow, no script."""
+"""The page of a fit in a real browser: images, slider, exposure, keyboard, print, dark, narrow, no script."""
 
 import json
 
@@ -39,7 +39,7 @@ def test_it_opens_without_a_complaint_or_a_request_and_is_small(chromium, page_p
 
 
 def test_the_page_itself_forbids_requests(chromium, page_path):
-    """The policy, tried: what a slipped-in script would do fails, and the network never hears of it."""
+    """Requests and scripts that an injected script would try are blocked by the page's policy."""
     with opened(chromium, page_path) as shown:
         failures = []
         shown.page.on("requestfailed", lambda request: failures.append((request.url, request.failure)))
@@ -54,13 +54,13 @@ def test_the_page_itself_forbids_requests(chromium, page_path):
         assert shown.page.evaluate("window.ran") is None
         assert all("Content Security Policy" in problem for problem in shown.problems)
         assert len(shown.problems) >= 3
-        # Chromium announces an image's request before the policy stops it.
+        # Chromium reports the request of an image before the policy blocks it.
         assert shown.requests == [address for address, _ in failures]
         assert all(reason == "csp" for _, reason in failures)
 
 
 def test_exposure_is_live_on_linear_values(chromium, page_path, images):
-    """Every canvas shows what the numpy twin of the tone curve makes of the half floats on disk."""
+    """Every canvas matches the numpy twin of the tone curve, applied to the half floats on disk."""
     exposures = view_block(images[0], {}).linear["exposures"]
     with opened(chromium, page_path) as shown:
         shown.page.select_option("#layout", "side")
@@ -78,7 +78,7 @@ def test_exposure_is_live_on_linear_values(chromium, page_path, images):
                 whole = images[0].radiance(variant)
                 linear = whole if quantity == "image" else images[0].indirect[variant]
                 expected = display_image(linear, exposures[quantity] * 2.0**stops).astype(int)
-                # The page multiplies radiance out in another order: it may fall on the other side of a step.
+                # The page computes radiance in another order of operations, so rounding may differ by a step.
                 assert np.abs(shown.canvas(variant).astype(int) - expected).max() <= 1
 
 
@@ -96,7 +96,7 @@ def test_exposure_changes_what_is_seen_and_reset_brings_it_back(chromium, page_p
 
 
 def test_the_slider_parts_left_from_right(chromium, page_path):
-    """At its ends one image is seen whole; between them each on its side; by mouse and by keyboard."""
+    """At either end one image fills the pane; in between, each is on its side. By mouse and by keyboard."""
     with opened(chromium, page_path) as shown:
         page = shown.page
         page.select_option("#left", "default")
@@ -111,7 +111,7 @@ def test_the_slider_parts_left_from_right(chromium, page_path):
         left, right, half = seen(100), seen(0), seen(50)
         middle = half.shape[1] // 2
         assert np.abs(left - right).max() > 20
-        height = int(0.9 * half.shape[0])  # captions lie below
+        height = int(0.9 * half.shape[0])  # without the captions at the bottom
         np.testing.assert_array_equal(half[:height, : middle - 4], left[:height, : middle - 4])
         np.testing.assert_array_equal(half[:height, middle + 4 :], right[:height, middle + 4 :])
 
@@ -144,7 +144,7 @@ def test_side_by_side_shows_all_four(chromium, page_path):
 def test_pointing_at_a_pixel_reads_its_values(chromium, page_path, images):
     with opened(chromium, page_path) as shown:
         canvas = shown.page.locator(".truth canvas").first
-        # What a fit ends with may take several lines above it.
+        # The sentence above it may take several lines and push it off the screen.
         canvas.scroll_into_view_if_needed()
         box = canvas.bounding_box()
         shown.page.mouse.move(box["x"] + (40.5 / 64) * box["width"], box["y"] + (30.5 / 48) * box["height"])
@@ -185,7 +185,7 @@ def test_the_keyboard_reaches_everything_and_can_skip(chromium, page_path):
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_text_stands_out_in_light_and_dark(chromium, page_path, scheme):
-    """4.5 to 1, the least that WCAG 2.2 asks for text (1.4.3), for every text colour on both grounds."""
+    """Every text colour has a contrast of at least 4.5 on both backgrounds, as WCAG 2.2 (1.4.3) requires."""
     with opened(chromium, page_path, color_scheme=scheme) as shown:
         colours = shown.page.evaluate(
             """(names) => Object.fromEntries(names.map((name) => {
@@ -219,7 +219,7 @@ def test_in_print_sliders_lie_side_by_side(chromium, page_path):
         shown.page.locator("#exposure").fill("2")
         shown.drawn("image 2")
         shown.page.emulate_media(media="print")
-        # On paper every image has the exposure, those too that were not seen on the screen.
+        # In print every image has the exposure, even those that were never on the screen.
         drawn = ".view canvas:not([data-drawn='image 2'])"
         shown.page.wait_for_function("drawn => !document.querySelector(drawn)", arg=drawn)
         assert shown.page.locator(".view canvas").count() == 10
@@ -229,7 +229,7 @@ def test_in_print_sliders_lie_side_by_side(chromium, page_path):
         assert clip == "none"
         assert not shown.page.locator(".toolbar").is_visible()
         assert not stack.locator(".split").is_visible()
-        # An A4 page is 794 px of 1/96 inch wide, with margins of 1 cm 718.
+        # An A4 page is 794 px (of 1/96 inch) wide, 718 px without margins of 1 cm.
         shown.page.set_viewport_size({"width": 718, "height": 1000})
         assert shown.page.evaluate("document.documentElement.scrollWidth") <= 718
         assert shown.page.pdf(format="A4", print_background=True).startswith(b"%PDF-")
@@ -249,14 +249,14 @@ def test_without_a_script_images_are_there_all_the_same(chromium, page_path, ima
 def test_parts_appear_where_the_fit_made_them(chromium, fit_copy):
     change_metrics(fit_copy, uncertainty=None)
     plain = scene_page(read_fit_folder(fit_copy))
-    for heading in ("Quality against milliseconds", "by cause", "trades with"):
+    for heading in ("Error against frame time", "by cause", "trades off against"):
         assert heading not in plain
     change_metrics(fit_copy, **PLANTED)
     assert run(["report", str(fit_copy)]) == 0
     with opened(chromium, fit_copy / "report.html") as shown:
         text = shown.page.inner_text("main")
         for words in (
-            "Quality against milliseconds",
+            "Error against frame time",
             "missing bounces",
             "0.8 to 1.3",
             "the scene",
@@ -265,7 +265,7 @@ def test_parts_appear_where_the_fit_made_them(chromium, fit_copy):
         assert "the prior" in text
         for words in ("3.75 ms", "predicted 3.5 ms", "640×480", "interleave 4, visibility maps"):
             assert words in text
-        assert shown.page.locator(".chart .named", has_text="asked for 4 ms").count() == 1
+        assert shown.page.locator(".chart .named", has_text="budget 4 ms").count() == 1
         assert "intensity, falloff transmittance" in text
         assert shown.page.locator(".range .interval").count() == 2
         described = shown.page.locator(".chart desc").all_text_contents()

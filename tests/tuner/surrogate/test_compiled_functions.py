@@ -1,4 +1,4 @@
-"""What JAX keeps of compiled functions, and what a kill may leave of it."""
+"""The cache of compiled functions: entries that a killed process left half-written are deleted."""
 
 import zlib
 

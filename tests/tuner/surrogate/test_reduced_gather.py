@@ -1,4 +1,4 @@
-"""The small least-squares problem of a view has the loss of all its receivers."""
+"""The small least-squares problem of a view gives the same loss as all its receivers."""
 
 from dataclasses import replace
 
@@ -44,7 +44,7 @@ def parameters(*values):
 
 @pytest.mark.parametrize("values", [(1.0, 0.5, 0.0), (0.9, 1.5, 0.4), (0.05, 20.0, 8.0), (20.0, 0.05, 0.0)])
 def test_same_loss(view, values):
-    """To 2e-6 of the sum of squares of image and target: sums of 4,500 float32 products, in two orders."""
+    """They agree to 2e-6 of the squared size of image and target, since both sum 4,500 float32 products."""
     table, halves = view
     target = target_of(*halves)
     reduced = reduce_gather(table, target)
@@ -64,7 +64,7 @@ def test_a_black_view_is_all_zero(view):
 
 
 def test_what_is_not_finite_stays_so(view):
-    """It must not be taken for a view without light."""
+    """NaN must not turn into a black view."""
     table, halves = view
     broken = replace(table, irradiance=table.irradiance.at[7, 0, 3].set(jnp.nan))
     assert np.isnan(reduce_gather(broken, target_of(*halves)).factor).any()

@@ -1,4 +1,4 @@
-"""What is compiled for wide vectors, whether or not XLA knows the option."""
+"""`wide_jit` works whether or not XLA knows the option for wide vectors."""
 
 import jax.numpy as jnp
 import pytest

@@ -5,14 +5,14 @@ const all = (selector, within = document) => [...within.querySelectorAll(selecto
 const told = document.querySelector(".told");
 
 function compared(kind, one, other) {
-  // What has no value stays last, whichever way round.
+  // Rows without a value come last in both orders.
   if (!one || !other) return { always: Number(!one) - Number(!other) };
   return { by: kind === "number" ? Number(one) - Number(other) : one.localeCompare(other, "en", { numeric: true }) };
 }
 
 function sort(table, heading) {
   const column = heading.cellIndex, kind = heading.dataset.kind, now = heading.getAttribute("aria-sort");
-  // Numbers begin with the greatest, which is the worst; words with A.
+  // The first click sorts numbers in descending order, so that the worst come first, and text from A to Z.
   const first = kind === "number" ? "descending" : "ascending", second = kind === "number" ? "ascending" : "descending";
   const order = now === first ? second : first, sign = order === "ascending" ? 1 : -1;
   const rows = all("tbody tr", table);

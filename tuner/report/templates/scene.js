@@ -1,18 +1,18 @@
 "use strict";
-// Linear images under one exposure. Half floats → radiance or irradiance → tone curve → canvas, all here.
+// Shows linear images under one exposure: half floats → radiance or irradiance → tone curve → canvas.
 
 const VARIANTS = ["reference", "default", "tuned", "ceiling"];
 const LUMINANCE = [0.2126, 0.7152, 0.0722];
 const one = (selector, within = document) => within.querySelector(selector);
 const all = (selector, within = document) => [...within.querySelectorAll(selector)];
 
-// Every half float as a float: IEC 60559 binary16.
+// The value of each of the 65,536 half floats (IEC 60559 binary16).
 const HALVES = Float32Array.from({ length: 65536 }, (_, bits) => {
   const sign = bits & 0x8000 ? -1 : 1, exponent = (bits >> 10) & 31, mantissa = bits & 1023;
   return sign * (exponent ? 2 ** (exponent - 15) * (1 + mantissa / 1024) : 2 ** -14 * (mantissa / 1024));
 });
 
-// The numbers of `packed_halves` in view_blocks.py: low bytes, then high bytes, plane by plane.
+// Decodes `packed_halves` of view_blocks.py: the low bytes of each channel, then the high bytes. Returns interleaved RGB.
 async function unpacked(text) {
   const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
@@ -22,7 +22,7 @@ async function unpacked(text) {
   return values;
 }
 
-// Khronos PBR Neutral (2024), from `shown` to itself; twin of shaders/display/tone_mapping.comp.
+// Khronos PBR Neutral (2024), in place. Twin of shaders/display/tone_mapping.comp.
 function toneCurve(shown) {
   const start = 0.8 - 0.04, desaturation = 0.15;
   const low = Math.min(shown[0], shown[1], shown[2]), offset = low < 0.08 ? low - 6.25 * low * low : 0.04;
@@ -34,7 +34,7 @@ function toneCurve(shown) {
   for (let c = 0; c < 3; c++) shown[c] = ((shown[c] * newPeak) / peak) * (1 - towardsWhite) + newPeak * towardsWhite;
 }
 
-// IEC 61966-2-1, in 8 bits, by the square root of the linear value: evenly enough spaced for 4,096 entries.
+// 8-bit sRGB (IEC 61966-2-1), indexed by the square root of the linear value, which spaces 4,096 entries evenly enough.
 const SRGB = Uint8Array.from({ length: 4096 }, (_, index) => {
   const linear = (index / 4095) ** 2;
   return Math.round(255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055));
@@ -77,7 +77,7 @@ class View {
     }
   }
 
-  // What is out of sight waits for its turn, so that exposure stays live however many views there are.
+  // Draws only canvases near the viewport, so that the exposure slider stays responsive with many views.
   draw(quantity, stops, everything) {
     const state = `${quantity} ${stops}`;
     for (const canvas of this.panes) {
@@ -102,7 +102,7 @@ class View {
     canvas.getContext("2d").putImageData(image, 0, 0);
   }
 
-  // Luminance of indirect irradiance under the pointer, in every variant.
+  // Shows the luminance of the indirect irradiance under the pointer, for every variant.
   watchPointer() {
     const { width, height, level } = this.linear, output = one(".probe output", this.article), hint = one(".hint", this.article);
     const read = (event) => {
@@ -174,7 +174,7 @@ async function start() {
   await Promise.all(views.map((view) => view.load()));
   toolbar.hidden = false;
   views.forEach((view) => watch.observe(view.article));
-  // Paper shows every image.
+  // Printing shows every image, so draw all of them.
   addEventListener("beforeprint", () => draw(true));
   matchMedia("print").addEventListener("change", (change) => change.matches && draw(true));
   arrange();

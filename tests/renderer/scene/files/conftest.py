@@ -1,4 +1,4 @@
-"""Small glTF files made in the test, from arrays with known contents."""
+"""Small glTF files built in tests from known arrays."""
 
 import io
 import json
@@ -15,7 +15,7 @@ TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
 
 
 class GltfFile:
-    """A glTF document under construction: `document` is its JSON, free to be changed before `write`."""
+    """A glTF document under construction. `document` is its JSON; tests may change it before `write`."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -50,7 +50,7 @@ class GltfFile:
         return self.add("bufferViews", view | members)
 
     def accessor(self, values: np.ndarray, **members: Any) -> int:
-        """An accessor with the array's own component type and shape, tightly packed."""
+        """Add a tightly packed accessor with the array's component type and shape; returns its index."""
         columns = 1 if values.ndim == 1 else values.shape[1]
         kind = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}[columns]
         accessor = {
@@ -73,7 +73,7 @@ class GltfFile:
         return primitive
 
     def add_base_color_image(self, image: Image.Image | bytes, **info: Any) -> dict[str, Any]:
-        """A material for the first primitive with that base colour texture; returns the texture."""
+        """Give the first primitive a material with this base-colour texture; returns the texture object."""
         if isinstance(image, Image.Image):
             stream = io.BytesIO()
             image.save(stream, "PNG")
@@ -87,7 +87,7 @@ class GltfFile:
         return texture
 
     def write(self, name: str = "scene.gltf") -> Path:
-        """Write as .gltf with a .bin beside it, or as .glb."""
+        """Write a .gltf with a .bin beside it, or a .glb."""
         path = self.folder / name
         buffer: dict[str, Any] = {"byteLength": max(len(self.blob), 1)}
         if path.suffix == ".glb":

@@ -1,4 +1,4 @@
-"""Accessors: every component type, stride, normalisation and sparse substitution gives the numbers meant."""
+"""Accessors: component types, strides, normalisation and sparse substitution give the right numbers."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
 
 
 def read_positions(gltf):
-    """Triangle corners of the only mesh, in drawing order."""
+    """The triangle corners of the only mesh, in drawing order."""
     (mesh,) = read_scene(gltf.write()).meshes
     return mesh.positions[mesh.triangles].reshape(-1, 3)
 
@@ -101,7 +101,7 @@ def test_a_small_part_of_a_large_vertex_buffer_is_all_that_is_kept(gltf):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"count": 4}, "its 4 elements end at byte 48 of a bufferView of 36"),
+        ({"count": 4}, "its 4 elements end at byte 48, beyond the bufferView's 36 bytes"),
         ({"count": 10**9}, "end at byte 12000000000"),
         ({"byteOffset": 4}, "end at byte 40"),
         ({"count": 0}, "count: must be a whole number of at least 1, got 0"),

@@ -1,4 +1,4 @@
-"""trimesh as an independent reader: total area and bounds of scenes that it reads right."""
+"""Comparison with trimesh, an independent reader: total area and bounds of scenes that it reads correctly."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.scene import Scene, transform_points
 
-# OBJ is left out: trimesh splits its concave faces as fans, which changes their area.
+# OBJ is skipped: trimesh splits concave faces as fans, which changes their area.
 GLTF_SCENES = [name for name, file in OUTSIDE_SCENES.items() if not file.endswith(".obj")]
 
 
@@ -23,7 +23,7 @@ def total_area(scene: Scene) -> float:
 
 
 def assert_read_alike(path) -> None:
-    """Area to 1e-4 and bounds to 1e-5 of the diagonal: both sides hold float32 positions."""
+    """Area agrees to 1e-4 and bounds to 1e-5 of the diagonal, since both sides store float32 positions."""
     ours, theirs = read_scene(path), trimesh.load_scene(path)
     bounds = ours.bounds()
     size = float(np.linalg.norm(bounds[1] - bounds[0]))

@@ -1,4 +1,4 @@
-"""Hundreds of hostile, odd and valid files: a scene or one line each, and never wrong geometry."""
+"""Hundreds of hostile, odd and valid files: each gives a scene or one line, and never wrong geometry."""
 
 import json
 import subprocess
@@ -10,7 +10,7 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[4]
 
-# Run apart, so that time and memory are the reader's own, and so that a crash is seen as one.
+# Runs in its own process, so that time and memory are the reader's own and a crash is noticed.
 READ_ALL = """
 import json, os, resource, sys, time, warnings
 from pathlib import Path
@@ -43,19 +43,19 @@ for name in json.load(sys.stdin):
         outcome |= {"triangles": 0, "refusal": str(error)}
     outcome["seconds"] = time.perf_counter() - start
     folder = str(path.parent.resolve())
-    # Python's own modules, loaded when first needed, are not the file's doing.
+    # Python opens its own modules when they are first imported.
     outcome["opened_outside"] = [
         name for name in opened
         if not os.path.realpath(name).startswith(folder + os.sep)
         and not name.endswith((".py", ".pyc", ".so"))
     ]
-    # Of this process alone: ru_maxrss starts at what the parent had when it made this one.
+    # VmHWM is for this process alone; ru_maxrss starts at the value of the parent.
     status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
     outcome["peak_mib"] = int(status["VmHWM"].split()[0]) >> 10
     print(json.dumps(outcome))
 """
 
-# What the Khronos validator calls these makes a surface wrong, or makes its place in the file a guess.
+# Codes of the Khronos validator for errors that make a surface wrong or its data ambiguous.
 BREAKS_GEOMETRY = {
     "ACCESSOR_INDEX_OOB",
     "ACCESSOR_INDEX_PRIMITIVE_RESTART",
@@ -83,14 +83,14 @@ BREAKS_GEOMETRY = {
     "UNRESOLVED_REFERENCE",
     "VALUE_NOT_IN_RANGE",
 }
-# Broken where a still, diffuse image does not look: read, and rightly.
+# Broken only in parts that a still image of diffuse surfaces does not use, so they may be read.
 READ_ALL_THE_SAME = {
     # A metallic factor that is a string.
     "assimp_gltf/test/models/glTF2/wrongTypes/badNumber.gltf",
-    # Trailing bytes after the length that the header says.
+    # Bytes after the end that the header declares.
     "handmade/scenes/glb_binchunk4g.glb",
 }
-# Valid, and refused for another reason than having no triangles.
+# Valid, but rejected for a reason other than having no triangles.
 VALID_BUT_REFUSED = {
     "handmade/scenes/json_1e6_nodes.gltf": "at most 2,000,000 JSON values",
     "handmade/scenes/json_deep_extras.gltf": "nested too deep",
@@ -143,7 +143,7 @@ def test_every_file_gives_a_scene_or_one_line_that_names_it(outcomes, verdicts, 
 
 
 def test_every_file_is_done_with_in_time_and_memory(outcomes):
-    # Measured at most 0.6 s, and 190 MiB in all.
+    # Measured: at most 0.6 s per file, and 190 MiB for all.
     assert {name: o["seconds"] for name, o in outcomes.items() if o["seconds"] > 2.0} == {}
     assert max(o["peak_mib"] for o in outcomes.values()) < 1024
 

@@ -1,4 +1,4 @@
-"""Files on disk: containers taken apart, nothing opened but regular files in the scene's folder."""
+"""Files: containers are parsed, and only regular files in the scene's folder are opened."""
 
 import json
 import os
@@ -54,7 +54,7 @@ def test_broken_glb_containers_are_refused(triangle, edit, message):
         ('{"asset": {"version": "2.0"}, "scene": NaN}', "NaN is not a JSON number"),
         ('{"asset": {"version": "2.0"}, "scene": -Infinity}', "-Infinity is not a JSON number"),
         ('{"asset": {"version": "2.0"}, "scene": 1e999}', "number 1e999 is too large"),
-        ('{"asset": {"version": "2.0"}, "scene": 0, "scene": 1}', "key 'scene' stands twice"),
+        ('{"asset": {"version": "2.0"}, "scene": 0, "scene": 1}', "key 'scene' appears twice in one object"),
         ('{"asset": {"version": "1.0"}}', "asset.version: only glTF 2.0 is read, got '1.0'"),
         ('{"asset": {"version": "2.1", "minVersion": "2.1"}}', "only glTF 2.0 is read"),
         ("{}", "key 'asset' is missing"),
@@ -146,7 +146,7 @@ def test_other_formats_are_refused_with_the_list_of_ours(tmp_path, name):
 
 
 def test_mitsuba_xml_is_refused_by_name(tmp_path):
-    with pytest.raises(InputError, match="Mitsuba XML is not read; turn it into a .glb"):
+    with pytest.raises(InputError, match="Mitsuba XML is not read directly; convert it to a .glb"):
         read_scene(tmp_path / "scene.xml")
 
 

@@ -1,4 +1,4 @@
-"""Punctual lights and cameras as KHR_lights_punctual and glTF 2.0 section 3.10 place them."""
+"""Punctual lights and cameras, placed as in KHR_lights_punctual and glTF 2.0 section 3.10."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def test_a_spot_shines_along_minus_z_of_its_node_whatever_its_scale(triangle):
         "intensity": 40,
         "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.3},
     }
-    # A quarter turn about x takes −z to +y.
+    # A quarter turn about x maps −z to +y.
     path = with_light(triangle, light, translation=[1, 2, 3], rotation=[HALF, 0, 0, HALF], scale=[5, 5, 5])
     (spot,) = read_scene(path).lights
     assert spot.kind == "spot"
@@ -48,7 +48,7 @@ def test_point_and_directional(triangle, kind):
     assert light.kind == kind
     np.testing.assert_array_equal(light.intensity, [3, 3, 3])
     if kind == "directional":
-        # A quarter turn about y takes −z to −x.
+        # A quarter turn about y maps −z to −x.
         np.testing.assert_allclose(light.direction_world, [-1, 0, 0], atol=1e-12)
 
 
@@ -75,7 +75,9 @@ def test_lights_out_of_range_are_refused(triangle, change, message):
 
 def test_range_is_left_aside_aloud(triangle):
     path = with_light(triangle, {"type": "point", "range": 5})
-    assert read_scene(path).warnings == ("a light's range is ignored: light falls off as 1/d² without end",)
+    assert read_scene(path).warnings == (
+        "a light's range is ignored: light falls off as 1/d² at any distance",
+    )
 
 
 def test_a_light_that_is_not_there_is_refused(triangle):

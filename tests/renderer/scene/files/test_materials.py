@@ -1,4 +1,4 @@
-"""Base colour: factors, textures in every pixel format, their coordinates, and what is said of the rest."""
+"""Base colour: factors, textures in every pixel format, texture coordinates, and warnings about the rest."""
 
 import io
 
@@ -48,7 +48,7 @@ def test_texels_keep_their_bytes_and_their_rows(gltf):
 @pytest.mark.parametrize("mode", ["L", "LA", "P", "RGBA", "I;16", "1"])
 def test_every_pixel_format_becomes_eight_bit_rgb(gltf, mode):
     if mode == "I;16":
-        # 16 bits hold 257 steps for each step of eight; 100 more is nearer the same one.
+        # An 8-bit step is 257 16-bit steps, so adding 100 rounds to the same 8-bit value.
         image = Image.fromarray(GREY_RAMP.astype(np.uint16) * 257 + np.array([[0, 100, 100, 0]], np.uint16))
     elif mode == "RGBA":
         image = Image.fromarray(
@@ -61,7 +61,7 @@ def test_every_pixel_format_becomes_eight_bit_rgb(gltf, mode):
 
 
 def test_sixteen_bit_colour(gltf):
-    # A PNG of one pixel in 16-bit RGB, which PIL can read but not write.
+    # A PNG with one pixel of 16-bit RGB. PIL can read but not write such a file.
     import struct
     import zlib
 
@@ -80,7 +80,7 @@ def test_sixteen_bit_colour(gltf):
 def test_other_image_formats(gltf, format_name):
     stream = io.BytesIO()
     Image.new("RGB", (8, 8), (200, 100, 50)).save(stream, format_name, quality=95)
-    # 3: what lossy coding of a plain colour may shift.
+    # Lossy compression of a uniform colour may shift it by up to 3.
     np.testing.assert_allclose(texels_of(gltf, stream.getvalue()), [[[200, 100, 50]] * 8] * 8, atol=3)
 
 
@@ -94,7 +94,7 @@ def transformed(gltf, transform, uv=UV):
 
 
 def test_texture_transform_scales_then_turns_then_moves(gltf):
-    # T · R · S by hand: (u, v) → (2u, 3v) → turned 90° counter-clockwise with v down (3v, −2u) → moved.
+    # T · R · S by hand: (u, v) → (2u, 3v) → (3v, −2u), a counter-clockwise turn with v down → moved.
     uv = transformed(gltf, {"offset": [0.5, 0.25], "rotation": np.pi / 2, "scale": [2, 3]})
     np.testing.assert_allclose(uv, [[0.5, 0.25], [0.5, 0.25 - 2], [0.5 + 3, 0.25]], atol=1e-6)
 
@@ -122,9 +122,7 @@ def test_coordinate_set_of_the_texture(gltf):
 def test_missing_coordinates_are_said(triangle):
     triangle.add_base_color_image(Image.new("RGB", (2, 2)))
     scene = read_scene(triangle.write())
-    assert scene.warnings == (
-        "1 textured primitive lacks the texture's coordinates: (0, 0) is used throughout",
-    )
+    assert scene.warnings == ("1 textured primitive has no texture coordinates; (0, 0) is used",)
 
 
 def test_wraps_and_one_texture_for_equal_samplers(gltf):
@@ -146,7 +144,7 @@ def test_wraps_and_one_texture_for_equal_samplers(gltf):
     ("image", "message"),
     [
         ({"uri": "nope.png"}, r"images\[0\]\.uri: 'nope\.png' cannot be read \(No such file"),
-        ({"uri": "data:image/png;base64,AAAA"}, r"images\[0\]: image is no PNG"),
+        ({"uri": "data:image/png;base64,AAAA"}, r"images\[0\]: image must be one of PNG, JPEG, WEBP"),
         ({"uri": "http://example.org/x.png"}, "must be a data: URI or a file in the scene's folder"),
         ({}, "key 'bufferView' is missing"),
     ],

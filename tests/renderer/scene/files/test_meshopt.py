@@ -1,4 +1,4 @@
-"""EXT_meshopt_compression: streams written here by the specification come back byte for byte."""
+"""EXT_meshopt_compression: streams encoded here according to the specification decode byte for byte."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from vpltune.renderer.scene.files.meshopt_indices import decode_indices, decode_
 
 
 def packed_group(zigzag: np.ndarray, mode: int) -> bytes:
-    """One group of 16 differences in a mode that can hold it: any in 1 to 3, zeros in 0."""
+    """Encode a group of 16 differences. Mode 0 can hold zeros only, modes 1 to 3 any differences."""
     if mode == 0:
         return b""
     if mode == 3:
@@ -31,7 +31,7 @@ def packed_group(zigzag: np.ndarray, mode: int) -> bytes:
 
 
 def encoded_attributes(elements: np.ndarray, modes: np.random.Generator) -> bytes:
-    """Elements [count, stride] as a stream; each group in a mode drawn among those that can hold it."""
+    """Encode elements [count, stride]. The mode of each group is drawn from those that can hold it."""
     count, stride = elements.shape
     baseline = modes.integers(0, 256, stride, dtype=np.uint8)
     before = np.vstack([baseline, elements[:-1]])
@@ -68,7 +68,7 @@ def zigzag_of(difference: int) -> int:
 
 
 def told_triangles(indices: list[int]) -> bytes:
-    """A triangle list with every index told in full: code 0xff, all choices 15."""
+    """Encode a triangle list with every index as a difference: code 0xff, all choices 15."""
     data, last = bytearray(), 0
     for start in range(0, len(indices), 3):
         data.append(0xFF)
@@ -82,7 +82,7 @@ def told_triangles(indices: list[int]) -> bytes:
 @settings(max_examples=40, deadline=None)
 @given(st.integers(1, 700), st.sampled_from([4, 8, 12, 64, 256]), st.integers(0, 2**31), st.integers(1, 256))
 def test_attributes_come_back(count, stride, seed, spread):
-    """Any bytes, in groups of every mode: blocks and groups that are not full, wraps past 255."""
+    """Any bytes decode, in groups of every mode, in partial groups and blocks, and with wrap-around."""
     random = np.random.default_rng(seed)
     steps = random.integers(-spread // 2, spread // 2 + 1, (count, stride)) * random.integers(
         0, 2, (count, 1)
@@ -97,7 +97,7 @@ def test_attributes_come_back(count, stride, seed, spread):
 
 
 def test_the_specification_s_example():
-    """Sixteen differences of four bits with two in full, which stand there with their values."""
+    """The specification's group of 16 differences of 4 bits, two of them as full bytes, with its values."""
     group = bytes.fromhex("175ff0bc77a9210034b5")
     expected = np.cumsum([-1, -4, -3, 26, -91, 0, -6, 6, -4, -4, 5, -5, 1, -1, 0, 0]).astype(np.uint8)
     stream = bytes([0xA0, 2]) + group + bytes(3) + bytes(32)
@@ -119,7 +119,7 @@ def test_told_indices_come_back(indices):
 
 
 def test_a_strip_by_its_edges():
-    """New vertices on the newest edge, a recent vertex, one beside the last told, and a fresh start."""
+    """New vertices on the newest edge, a recent vertex, one next to the last coded one, and a reset."""
     table = bytes([0x00]) + bytes(15)
     codes = bytes([0xF0, 0x00, 0x10, 0x03, 0x0F, 0x0E, 0xFE])
     data = varint(zigzag_of(9)) + bytes([0x00])
@@ -127,7 +127,7 @@ def test_a_strip_by_its_edges():
     # Edges, newest first, after (0, 1, 2): (0, 2), (2, 1), (1, 0). One more on (a, b) leaves (a, c), (c, b).
     expected = [(0, 1, 2), (0, 2, 3), (3, 2, 4), (3, 4, 1), (3, 1, 9), (3, 9, 10), (0, 1, 2)]
     np.testing.assert_array_equal(decode_triangles(stream, 21, "here").reshape(-1, 3), expected)
-    with pytest.raises(SceneFileError, match="does not end with its triangles"):
+    with pytest.raises(SceneFileError, match="must end after its last triangle"):
         decode_triangles(stream[:10] + b"\0" + stream[10:], 21, "here")
 
 
@@ -147,7 +147,7 @@ def test_noise_is_refused_or_decoded_but_never_crashes(noise, count):
 
 @pytest.mark.parametrize(("dtype", "bits"), [("i1", 6), ("i1", 8), ("<i2", 10), ("<i2", 16)])
 def test_octahedral_vectors_are_the_unit_vectors_they_stand_for(dtype, bits):
-    """Within the K bits' own step, on both hemispheres; the fourth component passes through."""
+    """To within the quantisation step of K bits, on both hemispheres. The fourth component is unchanged."""
     random = np.random.default_rng(1)
     vectors = random.normal(size=(200, 3))
     vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
@@ -164,7 +164,7 @@ def test_octahedral_vectors_are_the_unit_vectors_they_stand_for(dtype, bits):
 
 
 def test_quaternions_are_what_they_stand_for():
-    """Any place of the largest component, at 12 bits: within that step."""
+    """To within the quantisation step of 12 bits, for any position of the largest component."""
     random = np.random.default_rng(2)
     quaternions = random.normal(size=(200, 4))
     quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
@@ -189,15 +189,15 @@ def test_exponential_floats():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"mode": "POINTS"}, r"mode: must be ATTRIBUTES, TRIANGLES, INDICES, got 'POINTS'"),
-        ({"filter": "WAVELET"}, r"filter: is not one for mode ATTRIBUTES, got 'WAVELET'"),
-        ({"byteStride": 10}, r"byteStride: is not one for ATTRIBUTES and NONE, got 10"),
+        ({"mode": "POINTS"}, r"mode: must be one of ATTRIBUTES, TRIANGLES, INDICES, got 'POINTS'"),
+        ({"filter": "WAVELET"}, r"filter: is not allowed with mode ATTRIBUTES, got 'WAVELET'"),
+        ({"byteStride": 10}, r"byteStride: is not allowed with mode ATTRIBUTES and filter NONE, got 10"),
         ({"count": 4}, r"byteLength: must be count times byteStride, 48, got 36"),
-        ({"byteLength": 9}, "holds no EXT_meshopt_compression stream of attributes"),
+        ({"byteLength": 9}, "must be an EXT_meshopt_compression stream of attributes"),
     ],
 )
 def test_a_triangle_stored_compressed(triangle, change, message):
-    """The positions of a plain file's triangle, compressed; and what is wrong is named."""
+    """A triangle with compressed positions is read like the uncompressed one, and errors name their key."""
     positions = bytes(triangle.blob[:36])
     stream = encoded_attributes(np.frombuffer(positions, np.uint8).reshape(3, 12), np.random.default_rng(0))
     compression = {

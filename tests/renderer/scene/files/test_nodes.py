@@ -1,4 +1,4 @@
-"""The node hierarchy: transforms composed right, mirrored, instanced and deformed; no forest, no scene."""
+"""The node hierarchy: composed, mirrored, instanced and deformed transforms, and rejected graphs."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def placed_corners(scene):
 
 
 def test_translation_rotation_and_scale_of_a_chain(triangle):
-    # Child: scaled by 2, turned a quarter about z, moved along x. Parent: moved along y.
+    # Child: scaled by 2, a quarter turn about z, moved along x. Parent: moved along y.
     triangle.document["nodes"] = [
         {"children": [1], "translation": [0, 10, 0]},
         {"mesh": 0, "translation": [5, 0, 0], "rotation": QUARTER_TURN_ABOUT_Z, "scale": [2, 2, 2]},
@@ -37,7 +37,7 @@ def test_a_matrix_is_stored_column_by_column(triangle):
 
 
 def test_far_from_the_origin_nothing_is_rounded(triangle):
-    # 1e9 and back again: float32 would lose 64 units.
+    # Moved by 1e9 and back. float32 would lose 64 units.
     triangle.document["nodes"] = [
         {"children": [1], "translation": [1e9, 0, 0]},
         {"mesh": 0, "translation": [-1e9 + 0.125, 0, 0]},
@@ -76,7 +76,7 @@ def test_only_the_active_scene_is_read(triangle):
     del triangle.document["scene"]
     scene = read_scene(triangle.write())
     assert [instance.name for instance in scene.instances] == ["a"]
-    assert scene.warnings == ("the file names none of its 2 scenes: the first is read",)
+    assert scene.warnings == ("the file selects none of its 2 scenes: the first one is read",)
     del triangle.document["scenes"]
     scene = read_scene(triangle.write())
     assert len(scene.instances) == 3
@@ -118,11 +118,11 @@ def test_a_flattened_axis_is_a_surface_still_and_two_are_not(triangle):
 
 
 def test_a_chain_of_any_length(triangle):
-    # Deeper than Python's own stack, each link a hundredth of a unit.
+    # Deeper than Python's stack. Each link moves by 0.01.
     count = 5000
     triangle.document["nodes"] = [{"children": [i + 1], "translation": [0.01, 0, 0]} for i in range(count)]
     triangle.document["nodes"].append({"mesh": 0})
-    # 1e-9: five thousand roundings of double precision.
+    # 1e-9: 5,000 roundings in double precision.
     np.testing.assert_allclose(
         placed_corners(read_scene(triangle.write())), TRIANGLE + np.array([50, 0, 0]), atol=1e-9
     )
@@ -167,7 +167,7 @@ def test_a_rotation_off_unit_length_is_normalised_aloud(triangle):
     triangle.node["rotation"] = [0, 0, 3, 3]
     scene = read_scene(triangle.write())
     np.testing.assert_allclose(placed_corners(scene), [[0, 0, 0], [0, 1, 0], [-1, 0, 0]], atol=1e-12)
-    assert scene.warnings == ("1 node has a rotation that is no unit quaternion; it is normalised",)
+    assert scene.warnings == ("1 node has a rotation that is not a unit quaternion; it is normalised",)
 
 
 def test_morph_targets_at_the_default_weights(triangle):
@@ -185,7 +185,7 @@ def test_morph_targets_at_the_default_weights(triangle):
 
 
 def test_a_skin_stands_where_its_joints_are(gltf):
-    # Joint 0 at the origin, joint 1 at x = 1 in the bind pose, and lifted by 4 in the pose of the file.
+    # Joint 0 is at the origin, joint 1 at x = 1 in the bind pose and lifted by 4 in the file's pose.
     joints = np.array([[0, 0, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0]], np.uint8)
     weights = np.array([[1, 0, 0, 0], [1, 0, 0, 0], [0.5, 0.5, 0, 0]], np.float32)
     normals = np.tile(np.array([0, 0, 1], np.float32), (3, 1))

@@ -1,4 +1,4 @@
-"""OBJ: indices of every kind, polygons of every shape, materials, and refusals."""
+"""OBJ: all kinds of indices, polygons of any shape, materials, and rejected files."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def test_forward_references_are_read(tmp_path):
     ("outline", "expected"),
     [
         ([(0, 0), (2, 0), (2, 2), (0, 2)], 4.0),
-        # An arrowhead, from each corner in turn: one of the two diagonals lies outside.
+        # An arrowhead from different first corners: one of its diagonals is outside.
         ([(0, 0), (2, 1), (0, 2), (1, 1)], 1.0),
         ([(2, 1), (0, 2), (1, 1), (0, 0)], 1.0),
         # An L, and a comb with two notches.
@@ -60,7 +60,7 @@ def test_polygons_are_covered_once_whatever_their_shape(tmp_path, outline, expec
     (mesh,) = read_text(tmp_path, text + "f " + " ".join(map(str, range(1, len(outline) + 1)))).meshes
     a, b, c = mesh.positions[mesh.triangles].astype(np.float64).transpose(1, 0, 2)
     vectors = np.cross(b - a, c - a) / 2
-    # Were two triangles to overlap or face away, the areas would add up to more than the outline's own.
+    # If triangles overlapped or faced away, the sum of areas would exceed the area of the outline.
     assert np.linalg.norm(vectors, axis=1).sum() == pytest.approx(expected)
     assert np.linalg.norm(vectors.sum(axis=0)) == pytest.approx(expected)
     assert vectors[:, 3 - sum(axes)].min() * (-1 if is_reversed else 1) > 0 or is_reversed
@@ -83,7 +83,7 @@ def test_materials_textures_and_coordinates(tmp_path):
     np.testing.assert_array_equal(texture.texels_srgb, texels)
     assert texture.wrap_u == "clamp_to_edge"
     np.testing.assert_array_equal(mesh.normals, [[0, 0, 1]] * 4)
-    # v runs upwards in OBJ, and downwards from the first row here.
+    # v points up in OBJ, and down from the first row in a scene.
     by_position = {tuple(p): tuple(t) for p, t in zip(mesh.positions.tolist(), mesh.uv.tolist(), strict=True)}
     assert by_position[(0, 0, 0)] == (0, 1)
     assert by_position[(1, 1, 0)] == (1, 0)
@@ -100,14 +100,14 @@ def test_missing_textures_and_libraries_are_said(tmp_path):
     assert scene.warnings == (
         "material library 'none.mtl' cannot be read; white is used",
         "1 material is not defined in any library; white is used",
-        "2 textures missing ('no.png', …); Kd is used alone, white where there is none",
+        "2 textures missing ('no.png', …); Kd alone is used, or white without it",
     )
 
 
 def test_a_broken_texture_is_refused(tmp_path):
     (tmp_path / "a.mtl").write_text("newmtl a\nmap_Kd broken.png\n")
     (tmp_path / "broken.png").write_bytes(b"\x89PNG\r\n\x1a\n????")
-    with pytest.raises(InputError, match=r"scene\.obj: map_Kd 'broken\.png': image is"):
+    with pytest.raises(InputError, match=r"scene\.obj: map_Kd 'broken\.png': image must be one of PNG"):
         read_text(tmp_path, "mtllib a.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\n")
 
 
@@ -166,5 +166,5 @@ def test_what_is_no_surface_is_said(tmp_path):
         "1 face of fewer than 3 corners is ignored",
         "2 point or line elements are ignored",
         "free-form curves and surfaces are ignored",
-        "1 line of unknown meaning is ignored",
+        "1 line with an unknown keyword is ignored",
     )

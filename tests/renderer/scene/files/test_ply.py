@@ -1,4 +1,4 @@
-"""PLY: ASCII and both byte orders, mixed polygons, colours, normals, textures, and refusals."""
+"""PLY: ASCII and both byte orders, mixed polygons, colours, normals, textures, and rejected files."""
 
 import struct
 
@@ -23,7 +23,7 @@ def write_ply(
     vertex_properties=POSITION,
     comment="",
 ):
-    """A PLY with float and uchar vertex properties, in the order named."""
+    """Write a PLY with float and uchar vertex properties in the given order."""
     types = [line.split()[-2] for line in vertex_properties.split("\n")]
     header = (
         f"ply\nformat {format_name} 1.0\n{comment}"

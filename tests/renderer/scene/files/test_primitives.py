@@ -1,4 +1,4 @@
-"""Primitives: strips, fans, normals, colours and compression, against numbers known beforehand."""
+"""Primitives: strips, fans, normals, colours and compression, compared with known numbers."""
 
 import DracoPy
 import numpy as np
@@ -7,7 +7,7 @@ import pytest
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.files import read_scene
 
-# A fan round the first point; as a strip the same points zigzag.
+# A fan around its first point, and a zigzag strip.
 FAN = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]], np.float32)
 STRIP = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 2, 0]], np.float32)
 
@@ -124,7 +124,7 @@ class TestDraco:
     FACES = np.random.default_rng(3).permutation(30).reshape(-1, 3).astype(np.uint32)
 
     def compressed(self, gltf, unique_id=7, **changes):
-        """A primitive whose colours hide behind an attribute id that is not their place in the list."""
+        """A primitive whose colours have an attribute id that differs from their position in the list."""
         colors = np.stack([np.arange(30), np.full(30, 128), np.full(30, 255)], axis=1).astype(np.uint8)
         stream = DracoPy.encode(
             self.POSITIONS,
@@ -153,7 +153,7 @@ class TestDraco:
 
     def test_geometry_and_attribute_ids(self, gltf):
         (mesh,) = read_scene(self.compressed(gltf).write("scene.glb")).meshes
-        # 2⁻²⁰ of the extent of 2, the quantisation asked for.
+        # Quantisation to 20 bits of an extent of 2.
         np.testing.assert_allclose(corners_of(mesh), self.POSITIONS[self.FACES], atol=2.1e-6)
         np.testing.assert_allclose(mesh.colors[mesh.triangles][..., 0], self.FACES / 255, atol=1e-6)
         np.testing.assert_allclose(mesh.colors[:, 1:], [[128 / 255, 1.0]] * 30, atol=1e-6)
@@ -164,7 +164,7 @@ class TestDraco:
 
     def test_counts_that_differ_from_the_accessors_are_refused(self, gltf):
         self.compressed(gltf).document["accessors"][-1]["count"] = 27
-        with pytest.raises(InputError, match="holds 30 indices, its accessor says 27"):
+        with pytest.raises(InputError, match="holds 30 indices, but its accessor says 27"):
             read_scene(gltf.write())
 
     def test_a_broken_bitstream_is_refused(self, gltf):

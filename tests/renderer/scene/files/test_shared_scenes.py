@@ -1,4 +1,4 @@
-"""Real scenes that others made: read whole, with the sizes their own tools report, in a few seconds."""
+"""Real scenes from others are read completely and quickly, with the sizes that their README reports."""
 
 import time
 
@@ -8,7 +8,7 @@ import pytest
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.files import read_scene
 
-# Path, triangles with area, diagonal, textures, lights, cameras. Diagonals as in the folder's README.
+# Path, triangles with area, diagonal, textures, lights, cameras. Diagonals are from the folder's README.
 SCENES = [
     ("bevy-cornellbox/CornellBox.glb", 36, 961, 0, 0, 0),
     ("kajiya-cornell-box/scene.gltf", 32, 3.49, 0, 0, 0),
@@ -40,7 +40,7 @@ def test_real_scenes_are_read_whole(scenes_folder, path, triangles, diagonal, te
     # The README prints three digits.
     assert np.linalg.norm(high - low) == pytest.approx(diagonal, rel=5e-3)
     assert (len(scene.textures), len(scene.lights), len(scene.cameras)) == (textures, lights, cameras)
-    # Measured at most 0.9 s; the bound is for what grows with the square of a scene.
+    # Measured: at most 0.9 s. The bound catches quadratic time.
     assert seconds < 30.0
     for mesh in scene.meshes:
         np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1.0, atol=1e-6)

@@ -1,4 +1,4 @@
-"""The TOML beside a scene, and what goes before what."""
+"""The sidecar beside a scene, and the precedence of flags, sidecar, scene file and automatic choice."""
 
 import math
 
@@ -84,7 +84,7 @@ def test_point_and_directional(tmp_path):
         (SPOT.replace("intensity = 10", "intensity = -1"), "'intensity' must not be negative"),
         (SPOT.replace("intensity = 10", "intensity = inf"), "'intensity' must be 1 or 3 finite numbers"),
         (SPOT.replace("= 30", "= 70"), r"cone angles must satisfy 0 ≤ inner < outer"),
-        (SPOT + "direction = [0, -1, 0]\n", "give one of 'direction' and 'look_at'"),
+        (SPOT + "direction = [0, -1, 0]\n", "must have either 'direction' or 'look_at', got both"),
         (SPOT.replace("[0.0, 0.0, 2.0]", "[0.0, 2.0, 0.0]"), "direction must not be zero"),
         (SPOT.replace("spot", "point"), "unknown key 'look_at'"),
     ],
@@ -132,7 +132,7 @@ def test_the_files_own_camera_and_light_are_kept():
 def test_a_file_with_a_light_only_gets_a_camera_that_sees_what_is_lit():
     path = next(path for path in OWN_SCENES if path.stem == "gallery")
     full = read_scene(path)
-    # Behind the partition, where the automatic camera on its own does not look.
+    # Behind the partition, where the automatic camera would not look by itself.
     lamp = Light("point", np.ones(3), np.array([4.6, 2.0, 1.0]))
     camera, lights, notes = resolve_camera_and_lights(with_lights(full, lamp), path, None, None)
     space = free_space(full)

@@ -1,4 +1,4 @@
-"""Automatic cameras and lights: free space in closed form, then properties of what is chosen."""
+"""Automatic cameras and lights: free space compared with closed forms, then properties of the choices."""
 
 import math
 
@@ -16,7 +16,7 @@ from vpltune.renderer.scene.scene import Camera, Light, look_at, scaled, scaled_
 
 
 def box_mesh(low, high, material=0):
-    """A closed box, faces outwards: six quads."""
+    """A closed box of six quads that face outwards."""
     low, extent = np.array(low, float), np.array(high, float) - np.array(low, float)
     x, y, z = np.diag(extent)
     return [
@@ -34,9 +34,9 @@ def own(name: str):
 
 
 def test_every_voxel_that_a_triangle_crosses_is_occupied():
-    """A slanted, very thin and a large triangle: dense random points on them all lie in occupied voxels.
+    """At least 95 % of random points on slanted, thin and large triangles are in occupied voxels.
 
-    All but 5 % of the points: samples are 0.3 voxels apart and may miss a voxel of which a corner is cut off.
+    Samples are 0.3 voxels apart, so a voxel can be missed if a triangle only clips its corner.
     """
     random = np.random.default_rng(1)
     meshes = [quad([0, 0, 0], [10, 1.3, 0.2], [0.3, 7, 3]), quad([0, 5, 0], [9, 0.1, 8], [0.01, 0.02, 0.0])]
@@ -48,12 +48,12 @@ def test_every_voxel_that_a_triangle_crosses_is_occupied():
         points = space.to_voxels(a + np.sqrt(s)[:, None] * across)
         index = tuple(np.floor(points).astype(int).T)
         assert space.occupied[index].mean() > 0.95
-        # A missed voxel touches an occupied one: at worst across an edge.
+        # A missed voxel touches an occupied one, at worst at an edge.
         assert space.clearance[index].max() < 1.5
 
 
 def test_voxel_areas_add_up_to_the_surface():
-    """Sum over voxels equals Σ of triangle areas; shares within a triangle add up to one, so to rounding."""
+    """The voxel areas sum to the surface area up to rounding, since a triangle's shares sum to 1."""
     space = free_space(scene_of(box_mesh([0, 0, 0], [2, 3, 4]), [(0.5, 0.5, 0.5)]))
     assert space.area.sum() * space.voxel_world**2 == pytest.approx(52.0, rel=1e-5)
 
@@ -67,13 +67,13 @@ def test_clearance_is_the_distance_to_the_nearest_occupied_voxel():
 
 
 def test_marched_distances_in_a_box_are_the_closed_form():
-    """From the middle of a cube of edge 2 to its walls: 1/max|ω|, to within a voxel along the ray."""
+    """The distance from the centre of a cube of edge 2 to its walls is 1/max|ω|."""
     space = free_space(scene_of(box_mesh([-1, -1, -1], [1, 1, 1]), [(0.5, 0.5, 0.5)]))
     directions = sphere_directions(500)
     hits = marched(space, space.to_voxels(np.zeros((1, 3))), directions)
     assert hits.hit.all()
     expected = 1.0 / np.abs(directions).max(axis=1) / space.voxel_world
-    # A wall's voxel begins at most one voxel before the wall; slanted rays meet it up to √3 earlier.
+    # A wall's voxel begins at most one voxel before the wall, which is up to √3 voxels along a slanted ray.
     assert np.abs(hits.distance[0] - expected).max() < math.sqrt(3.0)
 
 
@@ -87,7 +87,7 @@ def test_rays_enter_the_grid_from_outside_and_leave_it():
 
 
 def test_cone_directions_fill_their_cone_evenly():
-    """Mean cosine of a uniform cap is (1 + cos θ)/2; the lattice has it to 1/count."""
+    """The mean cosine of a uniform cap is (1 + cos θ)/2. The lattice has it to within 1/count."""
     axis = np.array([0.6, 0.0, 0.8])
     cosine = cone_directions(axis, math.radians(40.0), 2000) @ axis
     assert cosine.min() >= math.cos(math.radians(40.0)) - 1e-9
@@ -96,7 +96,7 @@ def test_cone_directions_fill_their_cone_evenly():
 
 @pytest.mark.parametrize("kind", ["spot", "point", "directional"])
 def test_lit_points_are_those_in_sight_of_the_light(kind):
-    """A slab over the left half of a floor shades what lies under it."""
+    """A slab over the left half of a floor puts it in shadow."""
     floor = quad([-4, 0, -4], [0, 0, 8], [8, 0, 0])
     scene = scene_of([floor, *box_mesh([-4, 2, -4], [0, 2.3, 4])], [(0.5, 0.5, 0.5)])
     space = free_space(scene)
@@ -104,7 +104,7 @@ def test_lit_points_are_those_in_sight_of_the_light(kind):
     light = Light(kind, np.ones(3), np.array([0.0, 5.0, 0.0]), down, 0.2, math.radians(30.0))
     x = np.array([-2.0, 2.0, 3.7])
     reached = lit(space, light, space.to_voxels(np.stack([x, 0 * x, 0 * x], axis=1)))
-    # 3.7 lies outside the spot's cone, whose radius there is 5·tan 30° = 2.9.
+    # 3.7 is outside the spot's cone, whose radius on the floor is 5·tan 30° = 2.9.
     assert reached.tolist() == [False, True, kind != "spot"]
 
 
@@ -112,7 +112,7 @@ def test_lit_points_are_those_in_sight_of_the_light(kind):
     ("name", "factor"), [("cornell-box", 100.0), ("gallery", 0.01), ("gallery", 7.3), ("courtyard", 0.1)]
 )
 def test_choices_do_not_depend_on_scale(name, factor):
-    """The same camera and light, scaled: equal to rounding of the placement's 10⁻⁵ voxels."""
+    """A scaled scene gets the scaled camera and light, up to the rounding of 10⁻⁵ voxels in placement."""
     scene = own(name)
     camera, _ = default_camera(scene)
     light, _ = default_light(scene, camera)
@@ -137,7 +137,7 @@ def test_choices_are_the_same_every_time():
 
 
 def solid_room():
-    """A closed room, 6 × 3 × 6, with a closed solid block of 2 × 3 × 2 in the middle of it."""
+    """A closed room of 6 × 3 × 6 with a closed solid block of 2 × 3 × 2 in the middle."""
     walls = box_mesh([-3, 0, -3], [3, 3, 3])
     for wall in walls:
         wall.triangles[:] = wall.triangles[:, ::-1].copy()
@@ -173,7 +173,7 @@ def test_an_object_is_seen_whole_from_outside():
 def test_a_box_with_one_side_open_is_looked_into():
     camera, note = default_camera(own("cornell-box"))
     assert "open side" in note
-    # The published box is open towards −z, and its published camera looks along +z.
+    # The published box is open towards −z, and the published camera looks along +z.
     assert -camera.to_world[2, 2] == pytest.approx(1.0)
 
 
@@ -210,7 +210,7 @@ def test_scenes_of_others_get_a_camera_that_sees_and_a_light_that_lights(scenes_
     light, _ = default_light(scene, camera)
     space = free_space(scene)
     sight = seen_by(space, camera)
-    # An object leaves background in the image; a room next to none.
+    # An image of an object has background, one of a room hardly any.
     assert sight.hit_fraction > (0.7 if is_room(space) else 0.12)
     assert 0.2 < lit_fraction(space, sight, (light,)) < 0.97
     assert light_hits(space, light).hit.mean() > 0.35

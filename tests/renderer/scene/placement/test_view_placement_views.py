@@ -1,4 +1,4 @@
-"""Sets of views: moved from the start, in free space, lit, and the same for the same seed."""
+"""Sets of views: moved from the start, in free space, lit, and reproducible from the seed."""
 
 import numpy as np
 import pytest

@@ -1,0 +1,54 @@
+"""Lloyd iterations that turn VPLs into clustered disc lights: docs/runtime_formulas.md, "Clustered discs"."""
+
+import numpy as np
+
+from examples.formulas.vectors import dot, length
+from examples.formulas.virtual_point_lights import DARK_NORMAL, Vpls
+
+NORMAL_REACH = 0.7
+LEAST_SAMPLES = 4096
+SAMPLES_OF_VPL = 4
+LARGEST_COUNT = 4096
+
+
+def sample_count(vpl_count: int) -> int:
+    return max(LEAST_SAMPLES, SAMPLES_OF_VPL * vpl_count)
+
+
+def cluster_distance(between, normal, other_normal, scene_length: float) -> np.ndarray:
+    """How far apart two surface elements are [L²]."""
+    turned = 2.0 * NORMAL_REACH**2 * (1.0 - dot(normal, other_normal))
+    return dot(between, between) / scene_length**2 + turned
+
+
+def lloyd_iteration(vpls: Vpls, samples: Vpls, scene_length: float) -> Vpls:
+    """Each VPL takes the light of the samples nearest to it, and moves to their middle."""
+    away = cluster_distance(
+        samples.position[:, None] - vpls.position[None],
+        samples.normal[:, None],
+        vpls.normal[None],
+        scene_length,
+    )
+    away = np.where(vpls.footprint > 0.0, away, np.inf)
+    owner = np.where(samples.footprint > 0.0, away.argmin(axis=1), -1)
+    clusters = [_cluster(samples, owner == index, scene_length) for index in range(len(vpls.footprint))]
+    return Vpls(*(np.array(part) for part in zip(*clusters, strict=True)))
+
+
+def _cluster(samples: Vpls, own: np.ndarray, scene_length: float):
+    if not own.any():
+        return np.zeros(3), DARK_NORMAL, 0.0, np.zeros(3)
+    position, normal, footprint = samples.position[own], samples.normal[own], samples.footprint[own]
+    # Samples count alike, whatever their flux.
+    middle = position.mean(axis=0)
+    facing = normal.sum(axis=0)
+    facing /= max(float(length(facing)), 1e-30)
+    nearest = int(cluster_distance(position - middle, normal, facing, scene_length).argmin())
+    # To the middle over the plane of the sample nearest to it, but within that sample's disc.
+    slide = middle - position[nearest]
+    slide = slide - normal[nearest] * dot(normal[nearest], slide)
+    slide = slide * min(1.0, footprint[nearest] / max(float(length(slide)), 1e-30))
+    # Mean squared distance from the middle; a sample's own disc adds half its radius squared.
+    offset = position - middle
+    spread = max(float((dot(offset, offset) + 0.5 * footprint**2).mean()), 0.0)
+    return position[nearest] + slide, normal[nearest], np.sqrt(2.0 * spread), samples.flux[own].sum(axis=0)

@@ -365,7 +365,7 @@ def _spent_row(name: str, theirs: list[Spent], ours: list[Spent], quantity: str,
     against = f"ours ({sum(mine.arrived for mine in ours)} of {len(ours)} within 1 %)"
     missed = sum(not their.arrived for their in theirs)
     if missed:
-        against += f"; a lower bound: {missed} of {len(theirs)} ran out of time before"
+        against += f"; a lower bound: {missed} of {len(theirs)} were stopped before"
     return Row(name, ratio * own, unit, against, own)
 
 

@@ -106,8 +106,8 @@ def _srgb(linear: np.ndarray) -> np.ndarray:
 
 def _with_dots(image: np.ndarray, view: View, positions: np.ndarray, flux: np.ndarray) -> np.ndarray:
     """Draw a dot at each VPL before the camera, in the colour of its flux, even if a surface hides it."""
-    image = Image.fromarray(image // 2)
-    draw = ImageDraw.Draw(image)
+    dimmed = Image.fromarray(image // 2)
+    draw = ImageDraw.Draw(dimmed)
     to_camera = view.camera.world_to_camera
     placed = positions @ to_camera[:3, :3].T + to_camera[:3, 3]
     focal = 0.5 * view.size[1] / np.tan(view.camera.yfov / 2.0)
@@ -117,7 +117,7 @@ def _with_dots(image: np.ndarray, view: View, positions: np.ndarray, flux: np.nd
             u, v = view.size[0] / 2.0 - focal * x / z, view.size[1] / 2.0 + focal * y / z
             box = (u - VPL_RADIUS, v - VPL_RADIUS, u + VPL_RADIUS, v + VPL_RADIUS)
             draw.ellipse(box, fill=tuple(color.tolist()))
-    return np.asarray(image)
+    return np.asarray(dimmed)
 
 
 def _sheet(images: dict[str, np.ndarray]) -> Image.Image:

@@ -323,7 +323,8 @@ def spent_in(scene: dict[str, Any], judge: Judge = "losses") -> dict[str, Spent]
 def rows_of(measured: list[dict[str, Any]]) -> list[Row]:
     """The rows of the benchmark, from the contents of the JSON files of all scenes."""
     result = []
-    for judge, suffix in (("losses", ""), ("held_out", "_held_out")):
+    judges: tuple[tuple[Judge, str], ...] = (("losses", ""), ("held_out", "_held_out"))
+    for judge, suffix in judges:
         spent = [spent_in(scene, judge) for scene in measured]
         soonest = [
             min((scene[name] for name in SEARCHES), key=lambda found: (not found.arrived, found.seconds))

@@ -11,7 +11,7 @@ TEST_STAMP := $(VENV)/.test-programs
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all bench lint clean requirements schema
+.PHONY: help setup demo test test-all bench lint docs clean requirements schema
 .DELETE_ON_ERROR:
 
 help: ## list the targets
@@ -35,6 +35,11 @@ lint: setup ## style, format and import rules
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
 	@$(BIN)/lint-imports --no-logo
+
+docs: setup ## the documentation site, in build/site
+	@$(BIN)/python scripts/make_parameter_page.py
+	@$(BIN)/python scripts/make_test_vectors.py
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict -q
 
 requirements: setup ## pin every Python package anew, with hashes
 	@$(BIN)/python -m pip install -q pip-tools

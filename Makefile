@@ -9,9 +9,10 @@ PYTHON_STAMP := $(VENV)/.python-packages
 TEST_STAMP := $(VENV)/.test-programs
 # Fit and tests are long single processes: two pytest workers keep two cores busy.
 WORKERS ?= 2
+PYTHONS ?= 3.11 3.12 3.13
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all bench lint docs clean requirements schema
+.PHONY: help setup demo test test-all test-pythons bench lint docs clean requirements schema
 .DELETE_ON_ERROR:
 
 help: ## list the targets
@@ -22,33 +23,38 @@ setup: $(PYTHON_STAMP) ## system libraries, virtual environment, Python packages
 demo: setup ## fit the shipped Cornell box; images and numbers go to out/demo
 	@$(BIN)/vpltune fit configs/scenes/cornell-box.glb -o out/demo
 
-test: setup $(TEST_STAMP) ## the tests that a change must pass
+test: lint $(TEST_STAMP) ## lint, then the tests that a change must pass
 	@$(BIN)/python -m pytest -q -n $(WORKERS) -m "not slow"
 
 test-all: setup $(TEST_STAMP) ## every test, the slow ones too
 	@$(BIN)/python -m pytest -q -n $(WORKERS)
 
+test-pythons: setup ## the quick tests on each Python of PYTHONS that is here
+	@WORKERS=$(WORKERS) sh scripts/test_pythons.sh $(PYTHONS)
+
 bench: setup ## the benchmarks
 	@$(BIN)/vpltune bench all
 
-lint: setup ## style, format and import rules
+lint: setup ## style, format, import rules, docstrings, comments and types
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
 	@$(BIN)/lint-imports --no-logo
+	@$(BIN)/python scripts/check_words.py
+	@$(BIN)/basedpyright
 
-docs: setup ## the documentation site, in build/site
-	@$(BIN)/python scripts/make_parameter_page.py
-	@$(BIN)/python scripts/make_test_vectors.py
-	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict -q
+docs: setup ## the documentation as a website, in build/site
+	@$(BIN)/mkdocs build -q --strict -d build/site
 
-requirements: setup ## pin every Python package anew, with hashes
+# Keeps the pins there are; UPGRADE=1 takes the newest releases.
+requirements: setup ## pin Python packages, with hashes; with UPGRADE=1 anew
 	@$(BIN)/python -m pip install -q pip-tools
-	@$(BIN)/pip-compile -q --upgrade --generate-hashes --extra dev --all-build-deps --strip-extras \
+	@$(BIN)/pip-compile -q $(if $(UPGRADE),--upgrade) --generate-hashes --extra dev --all-build-deps --strip-extras \
 	    --no-header --no-annotate --no-emit-options --no-emit-index-url --no-emit-trusted-host \
 	    --no-emit-find-links -o requirements.txt pyproject.toml
 
-schema: setup ## write configs/default.json and the JSON Schema anew from the parameter table
+schema: setup ## write configs/default.json, the JSON Schema and docs/parameters.md anew from the parameter table
 	@$(BIN)/python scripts/make_config_files.py
+	@$(BIN)/python scripts/make_parameter_page.py
 
 clean: ## remove the virtual environment and everything made
 	@rm -rf $(VENV) build dist out .pytest_cache .hypothesis .ruff_cache .import_linter_cache

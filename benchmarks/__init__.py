@@ -1,7 +1,8 @@
-"""Benchmarks, run by `vpltune bench NAME` from a checkout.
+"""The benchmarks of a checkout, run by `vpltune bench NAME`.
 
-A benchmark is a module of this folder with a function `rows(progress) -> list[Row]`; its name is
-the module's. `benchmarks.harness.registry` finds them.
+A benchmark is a module in `benchmarks/speed`, `benchmarks/quality` or `benchmarks/tuning` with a function
+`rows(progress) -> list[Row]`. Its name is the module's name. `benchmarks.harness.registry` finds benchmarks,
+and `benchmarks/harness` holds what they share.
 """
 
 from benchmarks.harness.registry import benchmark_names, run_benchmark

@@ -22,8 +22,8 @@ def main() -> None:
         best, spent, unseen = best_found(scene), spent_in(scene), spent_in(scene, "held_out")
         ours = spent["ours"]
         for name, search in scene["searches"].items():
-            bound = "" if spent[name].there else "≥ "
-            bound_unseen = "" if unseen[name].there else "≥ "
+            bound = "" if spent[name].arrived else "≥ "
+            bound_unseen = "" if unseen[name].arrived else "≥ "
             seconds, frames, later = spent[name].seconds, spent[name].frames, unseen[name].seconds
             print(
                 f"| {scene['scene']} | {name} | {search['losses'][-1] / best:.4f} |"

@@ -1,4 +1,4 @@
-"""The command line: `vpltune`, also `python -m tuner`.
+"""The command line: `vpltune`, also `python -m vpltune`.
 
 Every command returns a `Report`; this module alone prints it, and turns what goes wrong into one
 line and an exit code: 0 done, 2 bad input, 3 the machine lacks something, 4 partly done, 130
@@ -9,12 +9,15 @@ import contextlib
 import errno
 import os
 import sys
+import time
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
+from vpltune.cli.any_command import QuietOption, VerboseOption, any_command
 from vpltune.cli.batch import batch
 from vpltune.cli.bench import bench
 from vpltune.cli.command_line import command_arguments
@@ -26,33 +29,66 @@ from vpltune.cli.import_scene import import_scene
 from vpltune.cli.render import render
 from vpltune.cli.report import (
     BAD_INPUT,
+    DEFECT,
     INTERRUPTED,
     MACHINE_LACKS,
     Report,
-    one_line,
     print_json,
     print_report,
     stdout_sent_to_stderr,
 )
 from vpltune.cli.report_page import report
 from vpltune.cli.train_prior import train_prior
+from vpltune.cli.verbosity import choose_verbosity, detail, is_verbose, one_line, reset_verbosity
 from vpltune.renderer.errors import InputError, MachineError
 
 PROGRAM = "vpltune"
-DEFECT = 1
+CHECKOUT = Path(__file__).resolve().parents[1]
+"""The repository; for an installed package, the folder that holds all packages."""
 
 app = typer.Typer(
     name=PROGRAM,
     help="Fits one-bounce indirect light from virtual point lights to a path tracer, and draws with it.",
     epilog="Exit codes: 0 done, 2 bad input, 3 the machine lacks something, 4 partly done, 130 interrupted.",
-    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (fit, batch, render, evaluate, export, report, train_prior, doctor, bench):
-    app.command()(command)
-# `import` is a word of Python's own.
-app.command("import")(import_scene)
+COMMANDS = {
+    "fit": fit,
+    "batch": batch,
+    "render": render,
+    "evaluate": evaluate,
+    "export": export,
+    "report": report,
+    "train-prior": train_prior,
+    "doctor": doctor,
+    "bench": bench,
+    "import": import_scene,
+}
+for name, command in COMMANDS.items():
+    # Benchmarks are not part of the installed package.
+    absent = name == "bench" and not (CHECKOUT / "benchmarks" / "harness").is_dir()
+    app.command(name, hidden=absent)(any_command(command, name))
+
+
+def _print_version(wanted: bool) -> bool:
+    if wanted:
+        print(f"{PROGRAM} {_version(PROGRAM)}")
+        raise typer.Exit
+    return wanted
+
+
+@app.callback()
+def before_any_command(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit."),
+    ] = False,
+    quiet: QuietOption = False,
+    verbose: VerboseOption = False,
+) -> None:
+    """The flags that stand before the command."""
+    choose_verbosity(quiet, verbose)
 
 
 def main() -> None:
@@ -71,10 +107,13 @@ def main() -> None:
 def run(arguments: Sequence[str]) -> int:
     """Run one command line, print what it reports, and return its exit code."""
     command_arguments.set(tuple(arguments))
+    reset_verbosity()
+    begin = time.perf_counter()
     # Asked for here and not in the commands, because it holds from before they load anything.
     json_wanted = "--json" in arguments and not {"-h", "--help"} & set(arguments)
     with stdout_sent_to_stderr() if json_wanted else contextlib.nullcontext():
         outcome = _outcome(arguments or ["--help"])
+        _tell_details(time.perf_counter() - begin)
     if isinstance(outcome, int):
         return outcome
     try:
@@ -101,19 +140,47 @@ def _outcome(arguments: Sequence[str]) -> Report | int:
     except typer.TyperException as error:
         command = error.ctx.command_path if getattr(error, "ctx", None) else PROGRAM
         return _failure(BAD_INPUT, f"{error.format_message().rstrip('.')}. Try: {command} --help")
-    except InputError as error:
-        return _failure(BAD_INPUT, error)
-    except MachineError as error:
-        return _failure(MACHINE_LACKS, error)
-    except MemoryError:
-        return _failure(MACHINE_LACKS, "not enough memory")
-    except OSError as error:
+    except Exception as error:
+        exit_code, explanation = _explained(error)
+        if exit_code == DEFECT or is_verbose():
+            traceback.print_exc()
+        return _failure(exit_code, explanation)
+
+
+def _explained(error: Exception) -> tuple[int, object]:
+    """The exit code of an error, and its one line."""
+    if isinstance(error, InputError):
+        return BAD_INPUT, error
+    if isinstance(error, MachineError):
+        return MACHINE_LACKS, error
+    if isinstance(error, MemoryError):
+        return MACHINE_LACKS, "not enough memory"
+    if isinstance(error, OSError):
         full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE, errno.ENOMEM)
         where = f"{error.filename}: " if error.filename is not None else ""
-        return _failure(MACHINE_LACKS if full else BAD_INPUT, f"{where}{error.strerror or error}")
-    except Exception as error:
-        traceback.print_exc()
-        return _failure(DEFECT, f"a defect of {PROGRAM}, please report it: {type(error).__name__}: {error}")
+        return MACHINE_LACKS if full else BAD_INPUT, f"{where}{error.strerror or error}"
+    return DEFECT, f"a defect of {PROGRAM}, please report it: {type(error).__name__}: {error}"
+
+
+def _tell_details(seconds: float) -> None:
+    """With `--verbose`: what ran, and how long it took."""
+    if not is_verbose():
+        return
+    python = ".".join(map(str, sys.version_info[:3]))
+    loaded = [name for name in ("numpy", "moderngl", "jax", "mitsuba", "drjit") if name in sys.modules]
+    versions = ", ".join(f"{name} {_version(name)}" for name in (PROGRAM, *loaded))
+    detail(f"{versions}, Python {python} on {sys.platform}")
+    detail(f"{seconds:.2f} s in all")
+
+
+def _version(distribution: str) -> str:
+    # Takes as long to import as all else that `--help` needs.
+    import importlib.metadata
+
+    try:
+        return importlib.metadata.version(distribution)
+    except importlib.metadata.PackageNotFoundError:
+        return "of unknown version"
 
 
 def _failure(exit_code: int, error: object) -> Report:

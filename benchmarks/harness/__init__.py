@@ -1,1 +1,1 @@
-"""What every benchmark needs: rows, the registry, scenes, the machine."""
+"""What benchmarks share: rows, the registry, scenes, and the description of the machine."""

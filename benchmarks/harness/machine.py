@@ -1,4 +1,4 @@
-"""The machine that figures were measured on, in one line."""
+"""Describes the machine that a benchmark runs on."""
 
 import os
 import platform

@@ -8,20 +8,21 @@ from pathlib import Path
 from benchmarks.harness.row import Row
 
 FOLDERS = ("speed", "quality", "tuning")
+"""Folders of `benchmarks` that are searched."""
 
 
 def benchmark_names() -> tuple[str, ...]:
-    """Names of all benchmarks, in alphabetical order."""
+    """The names of all benchmarks in alphabetical order."""
     return tuple(sorted(_modules()))
 
 
 def run_benchmark(name: str, progress: Callable[[str, float], None]) -> list[Row]:
-    """Run the benchmark called `name`, one of `benchmark_names()`."""
+    """Run the benchmark `name`, one of `benchmark_names()`; it calls `progress` with a stage and a share."""
     return importlib.import_module(_modules()[name]).rows(progress)
 
 
 def _modules() -> dict[str, str]:
-    """Benchmark name to module: the files of `FOLDERS` that define `rows`. None of them is imported."""
+    """Module names by benchmark name: the files of `FOLDERS` that define `rows`. Nothing is imported."""
     return {
         path.stem: f"benchmarks.{folder}.{path.stem}"
         for folder in FOLDERS

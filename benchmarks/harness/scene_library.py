@@ -1,11 +1,17 @@
-"""The scenes that are measured: our own, and those of others that lie outside the repository."""
+"""The scenes that benchmarks measure: the shipped ones, and third-party ones outside the repository."""
 
 import os
 from pathlib import Path
 
+from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.placement import resolve_camera_and_lights
+from vpltune.renderer.scene.scene import Scene
+from vpltune.renderer.scene.views import View
+
 REPOSITORY = Path(__file__).resolve().parents[2]
 
 OWN_SCENES = tuple(sorted((REPOSITORY / "configs" / "scenes").glob("*.glb")))
+"""The files of all shipped scenes."""
 
 OUTSIDE_SCENES = {
     "babylon-marble-tower": "marbleTower.gltf",
@@ -22,15 +28,27 @@ OUTSIDE_SCENES = {
     "playcanvas-house": "house.glb",
     "sketchfab-macross-diorama": "scene.glb",
 }
-"""Every scene of others that can be loaded: folder and file."""
+"""Folder and file of each third-party scene."""
+
+
+def own_scene(name: str) -> Path:
+    """The file of the shipped scene `name`."""
+    return REPOSITORY / "configs" / "scenes" / f"{name}.glb"
 
 
 def scenes_folder() -> Path:
-    """The folder of others' scenes: the environment variable VPLTUNE_SCENES, else one beside the checkout."""
+    """The folder of third-party scenes: VPLTUNE_SCENES if set, else shared/scenes beside the checkout."""
     return Path(os.environ.get("VPLTUNE_SCENES") or REPOSITORY.parent / "shared" / "scenes")
 
 
 def present_scenes() -> dict[str, Path]:
-    """Name to file of every scene, ours and others', that is there."""
+    """Name and file of every shipped scene, and of every third-party scene that exists on this machine."""
     others = {name: scenes_folder() / name / file for name, file in OUTSIDE_SCENES.items()}
     return {path.stem: path for path in OWN_SCENES} | {n: p for n, p in others.items() if p.is_file()}
+
+
+def scene_and_view(path: Path, size: tuple[int, int]) -> tuple[Scene, View]:
+    """Read a scene, and make a view of its own camera and lights, or of placed ones where it has none."""
+    scene = read_scene(path)
+    camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
+    return scene, View(path.stem, "fitted", size, camera, lights)

@@ -1,1 +1,1 @@
-"""Benchmarks of image quality."""
+"""Benchmarks of image quality, in stills and in motion."""

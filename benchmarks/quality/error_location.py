@@ -1,8 +1,7 @@
-"""Where the error sits: the share that the worst pixels hold of relMSE, of the loss that fits had, and of
-today's.
+"""How much of the error the worst pixels hold: by relMSE, by the former loss of fits, and by the present one.
 
-Five scenes, four views each with a light position of its own, drawn with the defaults. The loss before was
-relMSE plus ten times the squared error over mean(r)²; today's is `tuner.metrics.robust_error`.
+Five scenes are drawn with the default config, in four views with a light position each. The former loss was
+relMSE plus ten times the squared error over mean(r)². The present one is `tuner.metrics.robust_error`.
 """
 
 from collections.abc import Callable
@@ -19,16 +18,20 @@ from vpltune.tuner.metrics.view_metrics import squared_errors
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
 SCENES = ("cornell-box", "gallery", "godot-living-room", "kajiya-cornell-box", "playcanvas-house")
+"""Scenes of different kinds: rooms, a Cornell box, a house. A choice."""
 VIEWS = 4
-EVEN_SHARE = 10.0
-"""Weight of the plain squared error in the loss before."""
+"""Views of each scene: as many as a fit has by default."""
+PLAIN_WEIGHT = 10.0
+"""Weight of the plain squared error in the former loss."""
 SHARES = {"0.1": 0.001, "1": 0.01}
-"""Shares of a view's pixels, by their per cent."""
+"""Shares of a view's pixels by their per cent, as row names have them. A choice."""
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """For each scene, measure and share of the pixels: what the worst of them hold, beside that of the loss
-    before."""
+    """For each scene, measure and share of pixels, the part of the error that the worst pixels hold.
+
+    It is compared with their part of the former loss.
+    """
     made, present = [], present_scenes()
     scenes = [name for name in SCENES if name in present]
     for index, name in enumerate(scenes):
@@ -46,8 +49,8 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
                     f"{name}.{measure}.worst_{percent}_percent",
                     held[measure],
                     "1",
-                    "the loss before",
-                    held["before"],
+                    "the former loss",
+                    held["former"],
                 )
                 for measure in ("relmse", "robust")
             ]
@@ -56,7 +59,7 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 
 
 def pixel_errors(view: CapturedView) -> dict[str, Float64[np.ndarray, " pixels"]]:
-    """What each pixel of the captured image adds to relMSE, to the loss before and to the robust error."""
+    """What each pixel of the captured image adds to relMSE, to the former loss and to the robust error."""
     (counted,) = robust_errors([view])
     chosen = np.flatnonzero(view.captured.valid.ravel())[view.fitted_pixels(view.valid.size, 0)]
     image, reference = (
@@ -65,11 +68,11 @@ def pixel_errors(view: CapturedView) -> dict[str, Float64[np.ndarray, " pixels"]
     )
     relative = squared_errors(image, reference)
     plain = ((image - reference) ** 2).mean(axis=1) / reference.mean() ** 2
-    return {"relmse": relative, "before": relative + EVEN_SHARE * plain, "robust": counted.costs(image)}
+    return {"relmse": relative, "former": relative + PLAIN_WEIGHT * plain, "robust": counted.costs(image)}
 
 
 def worst_share(errors: Float64[np.ndarray, " pixels"], share: float) -> float:
-    """The part of a sum that its `share` of largest terms hold."""
+    """The part of the sum of `errors` that its largest terms hold, a `share` of all terms."""
     count = int(np.ceil(share * len(errors)))
     total = errors.sum()
     return float(np.sort(errors)[-count:].sum() / total) if total > 0.0 else 0.0

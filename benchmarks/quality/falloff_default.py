@@ -1,7 +1,8 @@
-"""Why α is 0.5 by default: what each α costs in error and in energy at 1,024 VPLs.
+"""Why α is 0.5 by default: the error and the energy of different α at 1,024 VPLs.
 
-Compared with 32,768 VPLs at α = 0.25, where neither noise nor lost energy counts any more. No visibility and
-no path tracer is involved: it is the point spread alone that is measured.
+The images are compared with one of 32,768 VPLs at α = 0.25, which has next to no noise and loses next to no
+energy. Neither visibility nor the path tracer is involved: the benchmark measures the point approximation
+alone.
 """
 
 from collections.abc import Callable
@@ -19,26 +20,33 @@ from vpltune.renderer.scene.views import View
 from vpltune.tuner.metrics.view_metrics import energy_ratio, relmse
 
 ALPHAS = (0.25, 0.5, 0.7, 1.0)
+"""Values of α to compare. A choice."""
 VPLS = 1_024
-CONVERGED = ArtistParameters(vpl_count=32_768, falloff_footprint=0.25)
+"""VPLs of the compared images: the default count."""
+CONVERGED = TunedConfig(
+    ArtistParameters(vpl_count=32_768, falloff_footprint=0.25), visibility="transmittance"
+)
+"""The config of the image that the others are compared with."""
 ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.15, 0.45))
+"""Rotations of the point table, over which errors are averaged. A choice."""
 SIZE = (96, 72)
+"""Width and height of the image in pixels. A choice."""
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """relMSE and energy of each α against the converged image: means over our scenes and rotations."""
+    """relMSE and energy ratio of each α against the converged image: means over scenes and rotations."""
     context = create_context()
     figures: dict[float, list[tuple[float, float]]] = {alpha: [] for alpha in ALPHAS}
     for index, path in enumerate(OWN_SCENES):
         progress("falloff_default", index / len(OWN_SCENES))
         scene = read_scene(path)
         view = View(path.stem, "fitted", SIZE, scene.cameras[0], scene.lights)
-        runtime = Runtime(scene, TunedConfig(visibility="none"), context=context)
+        runtime = Runtime(scene, context=context)
         converged = _irradiance(runtime, view, CONVERGED, (0.0, 0.0))
         for alpha in ALPHAS:
-            parameters = ArtistParameters(vpl_count=VPLS, falloff_footprint=alpha)
+            config = CONVERGED.with_parameters(ArtistParameters(vpl_count=VPLS, falloff_footprint=alpha))
             for rotation in ROTATIONS:
-                image = _irradiance(runtime, view, parameters, rotation)
+                image = _irradiance(runtime, view, config, rotation)
                 figures[alpha].append((relmse(image, converged), energy_ratio(image, converged)))
     means = {alpha: np.mean(values, axis=0) for alpha, values in figures.items()}
     progress("falloff_default", 1.0)
@@ -53,8 +61,8 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 
 
 def _irradiance(
-    runtime: Runtime, view: View, parameters: ArtistParameters, rotation: tuple[float, float]
+    runtime: Runtime, view: View, config: TunedConfig, rotation: tuple[float, float]
 ) -> np.ndarray:
-    runtime.parameters = parameters
-    captured = runtime.capture(view, rotation)
+    """Indirect irradiance [W/m²] of the valid pixels, [pixels, 3]."""
+    captured = runtime.capture(view, config, table_rotation=rotation, maps=False)
     return captured.indirect_irradiance[captured.valid]

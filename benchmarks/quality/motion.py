@@ -1,12 +1,13 @@
-"""Steadiness under motion: how much more images change from frame to frame than the light does.
+"""Flicker under motion: how much more the image changes from frame to frame than the true light does.
 
-A spot is swept through the gallery, and a sun stands over a courtyard whose bounds change because something
-rises out of it. The figure is the mean absolute change of indirect irradiance from frame to frame, of the
-mean irradiance, less that of a stand-in for the truth: the same frames with 16 times the VPLs from an RSM
-with twice the resolution.
+There are two clips. In one, a spot sweeps through the gallery. In the other, a sun stands still over a
+courtyard whose bounds grow, because a part of it rises. The figure is the mean absolute change of indirect
+irradiance from frame to frame, divided by the mean irradiance, minus the same figure of a reference: the
+frames with 16 times the VPLs from an RSM of twice the resolution.
 
-`python -m benchmarks.quality.motion FOLDER` writes the plot of every step, motion.png, and the swept spot's clip;
-`python -m benchmarks.quality.motion FOLDER box` writes box.mp4, a box carried through a room, with visibility maps.
+`python -m benchmarks.quality.motion FOLDER` writes motion.png, a plot of the change at every step, and
+motion.mp4, the clip of the spot. `python -m benchmarks.quality.motion FOLDER box` writes box.mp4, in which a
+box is carried through a room.
 """
 
 import sys
@@ -18,25 +19,36 @@ import numpy as np
 from jaxtyping import Float32
 
 from benchmarks.harness.row import Row
-from vpltune import configs
+from benchmarks.harness.scene_library import own_scene, scene_and_view
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.atomic_file import written_whole
 from vpltune.renderer.files.video_file import clip_writer
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
-from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.placement import resolve_camera_and_lights
+from vpltune.renderer.scene.animation import Pose
 from vpltune.renderer.scene.scene import Light, Scene
 from vpltune.renderer.scene.views import View
 
 SIZE = (96, 72)
+"""Width and height of the measured images in pixels. A choice."""
+CLIP_SIZE = (480, 360)
+"""Width and height of the written clips in pixels. A choice."""
+CLIP_FPS = 30.0
+"""Frames per second of the written clips. A choice."""
 FRAMES = 120
+"""Frames of a clip. A choice: four seconds at `CLIP_FPS`."""
 VPL_COUNT = 256
+"""VPLs of the compared images. A choice: few enough to flicker."""
 RSM_RESOLUTION = 1024
+"""Texels along the side of an RSM face: the runtime's own for one or two faces."""
 REFERENCE_FACTOR = 16
+"""VPLs of the reference over those of the compared images. A choice."""
+REFERENCE_RSM_FACTOR = 2
+"""The same for the RSM's resolution. A choice."""
 REFERENCE_FRAMES = 24
-"""Of the sweep's: the reference's own change is the mean over that many steps, spread evenly over it."""
+"""Steps of the clip, evenly spread, at which the reference is drawn. A choice: the mean needs no more."""
 
 STEADY = RuntimeOptions()
 VARIANTS = {
@@ -46,24 +58,24 @@ VARIANTS = {
     "both": STEADY,
 }
 SPOT_VARIANTS = ("neither", "filtering")
-"""A spot's face follows its cone and not the bounds: there is nothing to snap."""
+"""Variants for the clip with the spot, whose RSM face follows its cone and not the bounds: none snaps it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Clip:
-    """A scene in motion: what it is drawn with at each of `FRAMES` frames."""
+    """A scene in motion: its views and poses at each of `FRAMES` frames."""
 
     name: str
     variants: tuple[str, ...]
-    """Of `VARIANTS`."""
+    """Keys of `VARIANTS`."""
     scene: Scene
     views: tuple[View, ...]
     transforms: tuple[np.ndarray, ...] | None = None
-    """Of all instances, at each frame; None where nothing but the light moves."""
+    """Transforms of all instances at each frame; None where only the light moves."""
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """A row for each clip and variant: its excess change against that with neither measure."""
+    """For each clip and variant, its change beyond the reference's, against that of the variant `neither`."""
     found = []
     for clip in (swept_spot(), rising_bounds()):
         changes = measured_changes(clip, progress)
@@ -71,7 +83,7 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
         excess = {variant: float(change.mean() - truth) for variant, change in changes.items()}
         against = (
             "neither snapping nor filtering, with visibility maps"
-            f" (the stand-in's own change, {truth:.4f}, taken off)"
+            f" (the reference's own change, {truth:.4f}, is subtracted)"
         )
         found += [
             Row(f"motion_{clip.name}_{variant}", value, "of mean per frame", against, excess["neither"])
@@ -84,36 +96,36 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 def measured_changes(
     clip: Clip, progress: Callable[[str, float], None]
 ) -> dict[str, Float32[np.ndarray, " steps"]]:
-    """For each variant and the reference, the mean absolute change of each step, of the mean irradiance."""
+    """The mean absolute change of each step over the mean irradiance, by variant, and as `reference`."""
     changes = {}
     for index, name in enumerate(clip.variants):
         progress(f"motion, {clip.name}", index / (len(clip.variants) + 1))
-        runtime = _runtime(clip, VARIANTS[name], 1)
-        changes[name] = _changes(irradiance(runtime, clip, range(FRAMES)))
+        runtime = Runtime(clip.scene, VARIANTS[name])
+        changes[name] = _changes(irradiance(runtime, _config(), clip, range(FRAMES)))
     progress(f"motion, {clip.name}", len(clip.variants) / (len(clip.variants) + 1))
-    reference = _runtime(clip, STEADY, REFERENCE_FACTOR)
-    steps = [_changes(irradiance(reference, clip, (start, start + 1))) for start in reference_steps()]
+    runtime, config = Runtime(clip.scene, STEADY), _config(REFERENCE_FACTOR, REFERENCE_RSM_FACTOR)
+    steps = [_changes(irradiance(runtime, config, clip, (start, start + 1))) for start in reference_steps()]
     return changes | {"reference": np.concatenate(steps)}
 
 
 def irradiance(
-    runtime: Runtime, clip: Clip, frames: range | tuple[int, ...]
+    runtime: Runtime, config: TunedConfig, clip: Clip, frames: range | tuple[int, ...]
 ) -> Float32[np.ndarray, "frames height width 3"]:
-    """Indirect irradiance of some frames."""
+    """Indirect irradiance [W/m²] of some frames of a clip."""
     images = []
     for frame in frames:
         _set_pose(runtime, clip, frame)
-        images.append(runtime.render(clip.views[frame], "irradiance"))
+        images.append(runtime.render(clip.views[frame], config, layer="irradiance"))
     return np.stack(images)
 
 
 def reference_steps() -> list[int]:
-    """The steps at which the reference is drawn: from these frames to the next."""
+    """The frames at which the steps of the reference begin."""
     return np.linspace(0, FRAMES - 2, REFERENCE_FRAMES).astype(int).tolist()
 
 
 def swept_spot() -> Clip:
-    """The gallery's spot goes once through its room and turns as it goes."""
+    """The spot of the gallery moves through its room and turns on the way."""
     scene, view = _shipped("gallery")
     light = view.lights[0]
     low, high = scene.bounds()
@@ -123,7 +135,7 @@ def swept_spot() -> Clip:
 
 
 def rising_bounds() -> Clip:
-    """The courtyard's smallest part rises out of it, whose bounds double in height; the sun stands still."""
+    """The smallest part of the courtyard rises until the bounds are twice as high; the sun stands still."""
     scene, view = _shipped("courtyard")
     moved = _smallest_part_moved(scene, lambda share: (0.0, 0.5 + share, 0.0))
     return Clip("sun", tuple(VARIANTS), scene, (view,) * FRAMES, moved)
@@ -144,17 +156,15 @@ def _swept(light: Light, reach: float, share: float) -> Light:
 
 
 def _shipped(name: str) -> tuple[Scene, View]:
-    path = Path(configs.__file__).parent / "scenes" / f"{name}.glb"
-    scene = read_scene(path)
-    camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
-    return scene, View(name, "fitted", SIZE, camera, lights[:1])
+    scene, view = scene_and_view(own_scene(name), SIZE)
+    return scene, replace(view, lights=view.lights[:1])
 
 
-def _runtime(clip: Clip, options: RuntimeOptions, factor: int) -> Runtime:
-    changed = ArtistParameters().as_dict() | {"vpl_count": VPL_COUNT * factor}
-    resolution = RSM_RESOLUTION * (2 if factor > 1 else 1)
-    config = TunedConfig(ArtistParameters(**changed), visibility="maps")
-    return Runtime(clip.scene, config, options, rsm_resolution=resolution)
+def _config(vpl_factor: int = 1, rsm_factor: int = 1) -> TunedConfig:
+    return TunedConfig(
+        ArtistParameters(vpl_count=VPL_COUNT * vpl_factor),
+        quality=Quality(rsm_resolution=RSM_RESOLUTION * rsm_factor),
+    )
 
 
 def _changes(images: Float32[np.ndarray, "frames height width 3"]) -> Float32[np.ndarray, " steps"]:
@@ -162,7 +172,8 @@ def _changes(images: Float32[np.ndarray, "frames height width 3"]) -> Float32[np
 
 
 def write_plot(path: Path, changes: dict[str, dict[str, np.ndarray]]) -> None:
-    """The change of each step, one panel for each clip, logarithmic."""
+    """Plot the change at each step on a logarithmic axis, with a panel for each clip."""
+    # Imported here because matplotlib takes half a second to load.
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10.0, 4.0), layout="constrained")
@@ -177,7 +188,7 @@ def write_plot(path: Path, changes: dict[str, dict[str, np.ndarray]]) -> None:
 
 
 def carried_box() -> Clip:
-    """The Cornell box's smallest part is carried from side to side under its lamp."""
+    """The smallest part of the Cornell box is carried from side to side below the lamp."""
     scene, view = _shipped("cornell-box")
     moved = _smallest_part_moved(scene, lambda share: (0.15 * np.sin(2.0 * np.pi * share), 0.12, 0.0))
     return Clip("box", ("both",), scene, (view,) * FRAMES, moved)
@@ -186,7 +197,7 @@ def carried_box() -> Clip:
 def _smallest_part_moved(
     scene: Scene, offset: Callable[[float], tuple[float, float, float]]
 ) -> tuple[np.ndarray, ...]:
-    """Transforms of all instances at each frame; `offset` is in sides of the scene's bounds."""
+    """Transforms of all instances at each frame; `offset` gives the part's shift in sides of the bounds."""
     smallest = min(
         range(len(scene.instances)),
         key=lambda index: np.ptp(scene.meshes[scene.instances[index].mesh].positions, axis=0).max(),
@@ -202,18 +213,19 @@ def _smallest_part_moved(
 
 def _set_pose(runtime: Runtime, clip: Clip, frame: int) -> None:
     if clip.transforms is not None:
-        runtime.scene_buffers.set_pose(clip.transforms[frame], np.zeros((0, 4, 4)))
+        runtime.pose(Pose(clip.transforms[frame], np.zeros((0, 4, 4)), (), ()))
 
 
-def write_clip(path: Path, clip: Clip, config: TunedConfig, size: tuple[int, int] = (480, 360)) -> None:
-    """A clip's final images."""
-    runtime = Runtime(clip.scene, config)
-    exposure = None
-    with clip_writer(path, size, 30.0) as write:
-        for frame, view in enumerate(clip.views):
+def write_clip(path: Path, clip: Clip) -> None:
+    """Write a clip, drawn with the default config; all frames have the exposure of the first."""
+    runtime, config = Runtime(clip.scene), TunedConfig()
+    views = [replace(view, size=CLIP_SIZE) for view in clip.views]
+    _set_pose(runtime, clip, 0)
+    exposure = runtime.draw(views[0], config).read_exposure()
+    with clip_writer(path, CLIP_SIZE, CLIP_FPS) as write:
+        for frame, view in enumerate(views):
             _set_pose(runtime, clip, frame)
-            write(runtime.render(replace(view, size=size), exposure=exposure))
-            exposure = runtime.exposure() if exposure is None else exposure
+            write(runtime.render(view, config, exposure=exposure))
 
 
 def _main(folder: Path) -> None:
@@ -222,11 +234,11 @@ def _main(folder: Path) -> None:
         for clip in (swept_spot(), rising_bounds())
     }
     write_plot(folder / "motion.png", changes)
-    write_clip(folder / "motion.mp4", swept_spot(), TunedConfig())
+    write_clip(folder / "motion.mp4", swept_spot())
 
 
 if __name__ == "__main__":
     if sys.argv[2:] == ["box"]:
-        write_clip(Path(sys.argv[1]) / "box.mp4", carried_box(), TunedConfig(visibility="maps"))
+        write_clip(Path(sys.argv[1]) / "box.mp4", carried_box())
     else:
         _main(Path(sys.argv[1]))

@@ -1,8 +1,8 @@
-"""The formulas of two open RSM implementations at their shipped defaults, over our own VPLs.
+"""The VPL sums of two open-source RSM renderers at their shipped defaults, evaluated on our own VPLs.
 
-Both are written from their public shaders: what the sum over VPLs looks like, with their defaults and their
-absolute lengths. Placement, G-buffer and references are ours, so only the formulas differ. The programs
-themselves do worse: `vpltune bench peer` has one of them as it draws.
+Both formulas are written from the renderers' public shaders, with their default settings and absolute
+lengths. VPLs, G-buffer and references are ours, so that only the formulas differ. The renderers themselves do
+worse: `vpltune bench peer` compares with one of them as it draws.
 """
 
 import numpy as np
@@ -13,21 +13,24 @@ from vpltune.renderer.frame.capture import CapturedFrame
 BGFX_RADIUS = 3.0
 """World units: bgfx, example 31, `m_vplRadius`."""
 BGFX_AMOUNT = 0.25
-"""The share of VPL light in the mix with direct light: bgfx, example 31, `m_rsmAmount`."""
+"""Share of VPL light in the mix with direct light: bgfx, example 31, `m_rsmAmount`."""
 BABYLON_SAMPLES = 400
-"""Babylon.js, class GIRSM: `numSamples`."""
+"""VPLs of a pixel: Babylon.js, class GIRSM, `numSamples`."""
 BABYLON_INTENSITY = 0.1
+"""Factor of the indirect light: the default of Babylon.js."""
 BABYLON_EDGE = 0.1
-"""World units by which VPLs are pushed below their surface: `edgeArtifactCorrection`."""
+"""World units by which VPLs are pushed below their surface: class GIRSM, `edgeArtifactCorrection`."""
 CHUNK = 512
+"""Receivers that are summed at once. A choice: it bounds the memory."""
 
 Irradiance = Float32[np.ndarray, "receivers 3"]
 
 
 def bgfx_irradiance(captured: CapturedFrame) -> Irradiance:
-    """Linear falloff 1 − d/R, no cosine at the VPL, a sum of colours that is not divided by their number.
+    """bgfx: linear falloff 1 − d/R, no cosine at the VPL, and a sum of colours without a division by N.
 
-    A VPL's colour stands for its radiant exitance, Φ/(πl²), and the buffer's white for the brightest of them.
+    A VPL's colour stands for its radiant exitance Φ/(πl²), and white, which the sum is clamped to, for the
+    largest exitance.
     """
     exitance = _exitance(captured)
 
@@ -43,9 +46,10 @@ def bgfx_irradiance(captured: CapturedFrame) -> Irradiance:
 
 
 def babylon_irradiance(captured: CapturedFrame) -> Irradiance:
-    """Σ flux ξ² cosθ cosθ'/d², not divided by the number of samples, times an intensity without a unit.
+    """Babylon.js: Σ flux·ξ²·cosθ·cosθ'/d² without a division by N, times an intensity that has no unit.
 
-    ξ is a sample's place along the sequence. The clamp to 1 is left out: it depends on what 1 W/m² is called.
+    ξ is a sample's place in the sequence, in [0, 1]. The clamp to 1 is left out, since it depends on the unit
+    of irradiance.
     """
     taken = np.linspace(0, len(captured.vpl_flux) - 1, min(BABYLON_SAMPLES, len(captured.vpl_flux))).astype(
         int
@@ -65,13 +69,13 @@ def babylon_irradiance(captured: CapturedFrame) -> Irradiance:
 
 
 def _exitance(captured: CapturedFrame) -> Float[np.ndarray, "vpls 3"]:
-    """Radiant exitance of every VPL's surface, W/m²."""
+    """Radiant exitance of every VPL [W/m²]."""
     area = np.maximum(np.pi * captured.vpl_footprint.astype(np.float64) ** 2, 1e-30)
     return captured.vpl_flux / area[:, None]
 
 
 def _summed(captured: CapturedFrame, position: np.ndarray, light: np.ndarray, of_pairs) -> np.ndarray:
-    """Σ_j light_j · of_pairs at every valid pixel."""
+    """Σ_j light_j · of_pairs at every valid pixel, summed a chunk of receivers at a time."""
     receivers = captured.position_world[captured.valid].astype(np.float64)
     normals = captured.normal_world[captured.valid].astype(np.float64)
     sums = [

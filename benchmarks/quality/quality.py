@@ -1,6 +1,7 @@
-"""How close default, tuned and ceiling come to the path tracer: every scene, on fitted and held-out views.
+"""How close default, tuned and ceiling are to the path tracer, for every scene, on fitted and held-out views.
 
-Each view has a light position of its own. The images and all figures by view go to out/quality/<scene>.
+Every view has its own light position. Images and figures of each view are written to out/quality/<scene>;
+`python scripts/quality_table.py` prints them as a table.
 """
 
 from collections.abc import Callable
@@ -11,11 +12,12 @@ from vpltune.tuner.evaluation.evaluate import SPLITS
 from vpltune.tuner.scene_fit.fit_scene import FitOptions, fit_scene
 
 VIEWS = 2
+"""Fitted views of each scene. A choice: few, because the scenes are many."""
 FIGURES = ("relmse", "energy_ratio", "flip")
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """For each scene, split and figure: tuned against default, and ceiling against the noise floor."""
+    """For each scene and split, the figures of tuned and ceiling against those that bound them."""
     measured = []
     for name, path in present_scenes().items():
         output = REPOSITORY / "out" / "quality" / name

@@ -1,9 +1,12 @@
-"""The rival of cast visibility maps: imperfect shadow maps, splatted from points (Ritschel et al. 2008).
+"""Cast visibility maps against imperfect shadow maps, which are splatted from points (Ritschel et al. 2008).
 
-Every VPL projects its own random `POINTS` of the scene's surface into a `SIZE`² map, nearest first, each as
-wide as its share of the surface looks; holes are filled by pull-push. That is 4,096 points a VPL where a cast
-map takes some 1,500 rays. Looked up as our maps are, by the point's plane; and by depth as in the paper, with
-whichever of `BIASES` serves the scene best. In numpy: what is compared is the error, by default parameters.
+Each VPL projects its own `POINTS` random points of the scene's surface into a `SIZE`² map. The nearest point
+wins, and a splat is as wide as the point's share of the surface appears. Pull-push fills the holes. A VPL has
+4,096 points, where a cast map takes some 1,500 rays.
+
+The splatted maps are looked up in two ways: by the plane of the point, as cast maps are, and by depth, as in
+the paper, with the one of `BIASES` that suits the scene best. Parameters are the defaults. Everything runs in
+numpy, because only the error is compared.
 """
 
 from collections.abc import Callable
@@ -42,37 +45,45 @@ SCENES = (
     "playcanvas-house",
 )
 VPLS = 256
+"""VPLs of every view. A choice."""
 SIZE = 64
+"""Texels along the side of a splatted map. A choice: 64² texels for as many points."""
 POINTS = 4096
+"""Points of each VPL. A choice."""
 POOL = 1 << 17
-"""Points of the whole surface, of which each VPL draws its own."""
+"""Points of the whole surface, of which each VPL takes its own at random. A choice."""
+SEED = 2008
+"""Seed of the points. A choice."""
 WIDEST = 2
-"""Texels that a splat reaches from its centre; what is nearer to the VPL leaves holes, which are filled."""
+"""Texels that a splat reaches from its centre at most; closer surfaces leave holes. A choice."""
 BIASES = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2)
-"""Of the distance."""
-DEFAULT = ArtistParameters(vpl_count=VPLS)
+"""Depth biases to try, as shares of the distance. A choice."""
+FAR = 1e3
+"""Distance in units of L of the wall that stands where no point was splatted at all: beyond any scene."""
+LEAST_HEIGHT = 1e-9
+"""World units above the VPL's plane to which lower points are lifted, so that every direction is finite."""
+CONFIG = TunedConfig(ArtistParameters(vpl_count=VPLS))
 
 
 @dataclass(frozen=True, eq=False)
 class SurfacePoints:
-    """Spread evenly over the surface; lengths in world units."""
+    """Points that are spread evenly over a scene's surface; lengths in world units."""
 
     position: Float64[np.ndarray, "points 3"]
     normal: Float64[np.ndarray, "points 3"]
     area: float
-    """Of the whole surface."""
+    """Area of the whole surface."""
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """For each scene `<scene>_splatted` and `<scene>_splatted_by_depth`: relMSE against that of cast maps."""
+    """For each scene, the relMSE of splatted maps by plane and by depth, and of rays, against cast maps."""
     present = present_scenes()
     names = [name for name in SCENES if name in present]
     found = []
     for index, name in enumerate(names):
         progress(f"splatted_maps: {name}", index / len(names))
-        config = TunedConfig(DEFAULT, visibility="maps")
         prepared = prepare_scene(
-            present[name], SceneOptions(views=2), config, Stopwatch(), lambda stage, share: None
+            present[name], SceneOptions(views=2), CONFIG, Stopwatch(), lambda stage, share: None
         )
         found += _scene_rows(name, prepared)
     progress("splatted_maps", 1.0)
@@ -80,16 +91,16 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 
 
 def _scene_rows(name: str, prepared: PreparedScene) -> list[Row]:
-    random = np.random.default_rng(2008)
+    random = np.random.default_rng(SEED)
     points = surface_points(prepared.scene, POOL, random)
     by_plane, by_depth, cast, traced = [], [], [], []
     for view in prepared.views:
         texels = splatted_texels(view, points, random)
         receivers, vpls = gather_inputs(view.captured)
-        planes = vpl_visibility(receivers, vpls, texels, VisibilityParameters.of(DEFAULT))
+        planes = vpl_visibility(receivers, vpls, texels, VisibilityParameters.of(CONFIG.parameters))
         by_plane.append(_error(view, np.asarray(planes)))
         by_depth.append([_error(view, seen) for seen in _seen_by_depth(view, texels)])
-        drawn = runtime_irradiance(prepared.runtime, DEFAULT, view)
+        drawn = runtime_irradiance(prepared.runtime, CONFIG, view)
         cast.append(relmse(drawn[view.valid], view.reference.irradiance[view.valid]))
         traced.append(_error(view, ray_visibility(prepared, view)))
     ours = float(np.mean(cast))
@@ -101,7 +112,7 @@ def _scene_rows(name: str, prepared: PreparedScene) -> list[Row]:
 
 
 def surface_points(scene: Scene, count: int, random: np.random.Generator) -> SurfacePoints:
-    """`count` random points, uniform in area."""
+    """Draw `count` random points of the scene's surface, uniformly by area."""
     corners = np.concatenate(
         [
             transform_points(instance.to_world, mesh.positions)[mesh.triangles]
@@ -119,7 +130,7 @@ def surface_points(scene: Scene, count: int, random: np.random.Generator) -> Sur
 
 
 def splatted_texels(view: CapturedView, points: SurfacePoints, random: np.random.Generator) -> MapTexels:
-    """The maps of a view's VPLs, in the form that our lookup takes."""
+    """Splat the maps of a view's VPLs, in the form that `surface_overlap` takes."""
     captured = view.captured
     _, vpls = gather_inputs(captured)
     frames = np.asarray(hemisphere_frame(vpls.normal), np.float64)
@@ -133,8 +144,8 @@ def splatted_texels(view: CapturedView, points: SurfacePoints, random: np.random
         normal = points.normal[own] @ frame.T
         normal *= np.where((offset * normal).sum(1) > 0.0, -1.0, 1.0)[:, None]
         nearest = _filled(_splatted(offset, width), np.linalg.norm(offset, axis=1))
-        # Where nothing was splatted anywhere, a wall far away that faces the VPL.
-        far = np.array([[0.0, 0.0, 1e3 * captured.scene_length]])
+        # Index -1, where nothing was splatted in the whole map: a distant wall that faces the VPL.
+        far = np.array([[0.0, 0.0, FAR * captured.scene_length]])
         ends.append(np.concatenate([offset, far])[nearest] / captured.scene_length)
         normals.append(np.concatenate([normal, [[0.0, 0.0, -1.0]]])[nearest])
     shape = (len(origins), SIZE, SIZE)
@@ -143,9 +154,9 @@ def splatted_texels(view: CapturedView, points: SurfacePoints, random: np.random
 
 
 def _splatted(offset: Float64[np.ndarray, "points 3"], width: float) -> Int64[np.ndarray, "size size"]:
-    """The nearest point in each texel; -1 in holes."""
+    """Index of the nearest point in each texel; -1 in holes. `width`: a splat's radius in world units."""
     distance, texel = np.linalg.norm(offset, axis=1), _texel(offset)
-    # A hemisphere of 2π on SIZE² texels: what a texel spans at a unit's distance.
+    # SIZE² texels share the 2π steradians of a hemisphere: the width of a texel at distance 1.
     texel_width = np.sqrt(2.0 * np.pi) / SIZE
     reach = np.minimum(np.rint(width / distance / texel_width - 0.5), WIDEST)
     nearest = np.full((SIZE, SIZE), -1, np.int64)
@@ -165,7 +176,7 @@ def _splatted(offset: Float64[np.ndarray, "points 3"], width: float) -> Int64[np
 def _filled(
     nearest: Int64[np.ndarray, "size size"], distance: Float64[np.ndarray, " points"]
 ) -> Int64[np.ndarray, "size size"]:
-    """Pull-push: a hole takes the nearest point of the smallest square around it that has any."""
+    """Fill holes by pull-push: a hole takes the nearest point of the smallest square that has any."""
     if len(nearest) == 1:
         return nearest
     coarse = nearest[::2, ::2]
@@ -180,20 +191,21 @@ def _nearer(
     b: Int64[np.ndarray, "rows columns"],
     distance: Float64[np.ndarray, " points"],
 ) -> Int64[np.ndarray, "rows columns"]:
+    """The nearer point of two in each texel, given the distance of every point; -1 is farther than all."""
     distances = np.concatenate([distance, [np.inf]])
     return np.where(distances[b] < distances[a], b, a)
 
 
 def _texel(offset: Float64[np.ndarray, "n 3"]) -> Int64[np.ndarray, "n 2"]:
-    """Column and row of the texel in each direction; below the horizon, of some texel at the border."""
-    upper = np.concatenate([offset[:, :2], np.maximum(offset[:, 2:], 1e-9)], axis=1)
+    """Column and row of the texel in each direction; below the horizon, those of a texel at the border."""
+    upper = np.concatenate([offset[:, :2], np.maximum(offset[:, 2:], LEAST_HEIGHT)], axis=1)
     direction = upper / np.linalg.norm(upper, axis=1, keepdims=True)
     place = (np.asarray(hemi_octahedral_encode(jnp.asarray(direction))) * 0.5 + 0.5) * SIZE
     return np.clip(place.astype(np.int64), 0, SIZE - 1)
 
 
 def _seen_by_depth(view: CapturedView, texels: MapTexels) -> list[np.ndarray]:
-    """Visibility [receivers, vpls] for each of `BIASES`."""
+    """Visibility by depth comparison, [receivers, vpls] in {0, 1}, for each of `BIASES`."""
     receivers, vpls = gather_inputs(view.captured)
     frames, origins = np.asarray(hemisphere_frame(vpls.normal)), np.asarray(visibility_origin(vpls))
     depth = np.linalg.norm(np.asarray(texels.end), axis=1).reshape(len(origins), SIZE, SIZE)
@@ -208,5 +220,6 @@ def _seen_by_depth(view: CapturedView, texels: MapTexels) -> list[np.ndarray]:
 
 
 def _error(view: CapturedView, visibility: np.ndarray) -> float:
-    image = surrogate_irradiance(view, DEFAULT, jnp.asarray(visibility))
+    """relMSE of the surrogate's image of a view with this visibility, [receivers, vpls]."""
+    image = surrogate_irradiance(view, CONFIG.parameters, jnp.asarray(visibility))
     return relmse(image[view.valid], view.reference.irradiance[view.valid])

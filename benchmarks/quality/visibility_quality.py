@@ -1,18 +1,17 @@
-"""What each kind of visibility leaves of the error: none, mean transmittance, maps, rays; untuned and tuned.
+"""The error with each kind of visibility: none, mean transmittance, maps, and rays; untuned and tuned.
 
-Every scene that can be loaded, three views with a light position each, `VPLS` VPLs: fitted on two of them,
-measured on those and on the third. The ceiling has the same VPLs and rays towards every pixel; maps that are
-not refined show what the rays at silhouettes are worth.
+Every scene has `VPLS` VPLs and three views with a light position each. Parameters are fitted to two of the
+views, and measured on these and on the held-out third. The ceiling has the same VPLs, with rays towards every
+pixel. Maps without refinement tell what the extra rays at silhouettes are worth.
 
-`python -m benchmarks.quality.visibility_quality FILE [SCENE …]` writes each scene's figures into a JSON file as they
-come, keeps what is there, and ends with the summary and the scenes that were named: a long run may be done in
-pieces.
+`python -m benchmarks.quality.visibility_quality FILE [SCENE …]` writes the figures of each scene to a JSON
+file as soon as they are measured. It skips scenes that the file already has, so that a long run can be split.
+At the end it prints the summary, and the rows of the scenes that were named.
 """
 
 import json
 import sys
 from collections.abc import Callable
-from dataclasses import asdict, replace
 from pathlib import Path
 from statistics import median
 
@@ -21,33 +20,48 @@ import numpy as np
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import present_scenes
 from vpltune.renderer.config.artist_parameters import ArtistParameters
-from vpltune.renderer.config.tuned_config import TunedConfig, Visibility
+from vpltune.renderer.config.quality import Quality
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.atomic_file import write_text_whole
-from vpltune.renderer.frame.runtime import Runtime
-from vpltune.renderer.frame.runtime_options import RuntimeOptions
 from vpltune.tuner.evaluation.evaluate import SPLITS, surrogate_irradiance
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene, SceneOptions, Stopwatch, prepare_scene
 from vpltune.tuner.fitting.fit_placement import fit_placement
 from vpltune.tuner.fitting.fit_views import robust_errors
-from vpltune.tuner.fitting.search_space import held_for
-from vpltune.tuner.metrics.view_metrics import mean_metrics, view_metrics
+from vpltune.tuner.metrics.view_metrics import mean_metrics
 from vpltune.tuner.reference import ray_traced_visibility
 from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views, runtime_irradiance
 
 VPLS = 256
-MODES: tuple[Visibility, ...] = ("none", "transmittance", "maps")
+"""VPLs of every view. A choice."""
+FITTED_VIEWS = 2
+"""Views of each scene that are fitted; a third is held out. A choice."""
+DEFAULT = ArtistParameters(vpl_count=VPLS)
+CONFIGS = {
+    "none": TunedConfig(DEFAULT, visibility="transmittance"),
+    "transmittance": TunedConfig(DEFAULT, visibility="transmittance"),
+    "maps": TunedConfig(DEFAULT, visibility="maps"),
+    "maps_unrefined": TunedConfig(DEFAULT, visibility="maps", quality=Quality(map_refinement=1)),
+}
+"""The untuned config of each kind of visibility. Without visibility, κ stays 0 when the others are fitted."""
+HELD = {"none": frozenset({"extinction_coefficient"})}
+"""Parameters that a fit leaves at their defaults, by kind of visibility."""
 UNREFINED = "maps_unrefined"
 CEILING = "ceiling"
 STATES = ("untuned", "tuned")
-DEFAULT = ArtistParameters(vpl_count=VPLS)
+MEDIAN_LIMIT, WORST_LIMIT = 1.5, 3.0
+"""relMSE of maps over that of the ceiling: limits for the median and for the worst scene. A choice."""
+LEAST_RELMSE = 1e-6
+"""Ceilings below this are of scenes without indirect light, which have no ratio. A choice."""
 
 Figures = dict[str, dict[str, dict[str, dict[str, float]]]]
-"""By mode, state and split: relmse, energy_ratio, flip."""
+"""The figures of `ViewMetrics` by kind of visibility, state and split."""
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """The summary, then for each scene, mode, state and split its relMSE against the ceiling's, its energy
-    against the reference's and its HDR-FLIP against the ceiling's."""
+    """The summary, then three rows for each scene, kind of visibility, state and split.
+
+    These compare relMSE and HDR-FLIP with the ceiling's, and the energy ratio with 1.
+    """
     scenes = present_scenes()
     measured = {}
     for index, name in enumerate(scenes):
@@ -58,12 +72,10 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 
 
 def scene_figures(path: Path) -> Figures:
-    """All figures of one scene."""
-    figures: Figures = {}
-    for mode in MODES:
-        prepared = _prepared(path, mode)
-        figures[mode] = _drawn_figures(prepared)
-    figures[UNREFINED] = _drawn_figures(_unrefined(prepared))
+    """Measure one scene with every kind of visibility, and its ceiling."""
+    options = SceneOptions(views=FITTED_VIEWS)
+    prepared = prepare_scene(path, options, CONFIGS["maps"], Stopwatch(), lambda stage, share: None)
+    figures = {mode: _drawn_figures(prepared, mode) for mode in CONFIGS}
     seen = {view.view.name: ray_visibility(prepared, view) for view in prepared.views}
     fitted = _of_fitted(prepared.views)
     of_rays = [seen[view.view.name] for view in fitted]
@@ -78,54 +90,43 @@ def scene_figures(path: Path) -> Figures:
 
 
 def summary_rows(measured: dict[str, Figures]) -> list[Row]:
-    """Over scenes and splits: the median and the worst ratio of maps to ceiling, in relMSE, and the median of
-    that of maps that are not refined."""
+    """The median and the worst ratio of relMSE, maps over ceiling, over all scenes and splits.
+
+    A third row has the median ratio of maps without refinement.
+    """
     found = []
     for state in STATES:
         ratios = _over_ceiling(measured, "maps", state)
         worst = max(ratios, key=lambda name: ratios[name])
         unrefined = median(_over_ceiling(measured, UNREFINED, state).values())
         found += [
-            Row(f"maps_over_ceiling_{state}_median", median(ratios.values()), "1", "limit", 1.5),
-            Row(f"maps_over_ceiling_{state}_worst", ratios[worst], "1", f"limit; {worst}", 3.0),
+            Row(f"maps_over_ceiling_{state}_median", median(ratios.values()), "1", "limit", MEDIAN_LIMIT),
+            Row(f"maps_over_ceiling_{state}_worst", ratios[worst], "1", f"limit; {worst}", WORST_LIMIT),
             Row(f"{UNREFINED}_over_ceiling_{state}_median", unrefined, "1", CEILING, 1.0),
         ]
     return found
 
 
 def _over_ceiling(measured: dict[str, Figures], mode: str, state: str) -> dict[str, float]:
-    """By scene and split: relMSE over the ceiling's."""
+    """relMSE over the ceiling's, by scene and split."""
     return {
         f"{name}.{split}": figures[mode][state][split]["relmse"] / ceiling
         for name, figures in measured.items()
         for split in SPLITS
-        # A scene without indirect light has nothing to compare.
-        if (ceiling := figures[CEILING][state][split]["relmse"]) > 1e-6
+        if (ceiling := figures[CEILING][state][split]["relmse"]) > LEAST_RELMSE
     }
 
 
-def _prepared(path: Path, mode: Visibility) -> PreparedScene:
-    config = TunedConfig(DEFAULT, visibility=mode)
-    return prepare_scene(path, SceneOptions(views=2), config, Stopwatch(), lambda stage, share: None)
-
-
-def _unrefined(prepared: PreparedScene) -> PreparedScene:
-    """The same with maps of one ray a texel at silhouettes too."""
-    config = TunedConfig(DEFAULT, visibility=prepared.runtime.visibility)
-    options = RuntimeOptions(visibility_map_refinement=1)
-    runtime = Runtime(prepared.scene, config, options, context=prepared.runtime.context)
+def _drawn_figures(prepared: PreparedScene, mode: str) -> dict[str, dict[str, dict[str, float]]]:
+    """The figures of the runtime's images with one kind of visibility, by state and split."""
+    runtime, config = prepared.runtime, CONFIGS[mode]
     references = tuple(view.reference for view in prepared.views)
-    captured = capture_views(runtime, tuple(view.view for view in prepared.views), references)
-    return replace(prepared, runtime=runtime, views=captured)
-
-
-def _drawn_figures(prepared: PreparedScene) -> dict[str, dict[str, dict[str, float]]]:
-    """By state and split, as the runtime draws them."""
-    runtime = prepared.runtime
-    tuned = _tuned(_of_fitted(prepared.views), runtime.visibility)
+    views = capture_views(runtime, config, tuple(view.view for view in prepared.views), references)
+    fitted = _of_fitted(views)
+    tuned = fit_placement(fitted, DEFAULT, robust_errors(fitted), held=HELD.get(mode, frozenset())).parameters
     return {
-        state: _figures(prepared.views, lambda view, p=parameters: runtime_irradiance(runtime, p, view))
-        for state, parameters in zip(STATES, (DEFAULT, tuned), strict=True)
+        state: _figures(views, lambda view, c=chosen: runtime_irradiance(runtime, c, view))
+        for state, chosen in zip(STATES, (config, config.with_parameters(tuned)), strict=True)
     }
 
 
@@ -133,12 +134,8 @@ def _of_fitted(views: tuple[CapturedView, ...]) -> tuple[CapturedView, ...]:
     return tuple(view for view in views if view.view.split == "fitted")
 
 
-def _tuned(views: tuple[CapturedView, ...], mode: Visibility) -> ArtistParameters:
-    return fit_placement(views, DEFAULT, robust_errors(views), held=held_for(mode)).parameters
-
-
 def ray_visibility(prepared: PreparedScene, view: CapturedView) -> np.ndarray:
-    """What rays from every receiver to every VPL of a view tell, [receivers, vpls] in {0, 1}."""
+    """Trace rays from every receiver to every VPL of a view; returns [receivers, vpls] in {0, 1}."""
     captured = view.captured
     return ray_traced_visibility(
         prepared.scene,
@@ -152,16 +149,13 @@ def ray_visibility(prepared: PreparedScene, view: CapturedView) -> np.ndarray:
 def _figures(
     views: tuple[CapturedView, ...], irradiance: Callable[[CapturedView], np.ndarray]
 ) -> dict[str, dict[str, float]]:
-    found = {}
-    for split in SPLITS:
-        metrics = []
-        for view in views:
-            if view.view.split == split:
-                image = irradiance(view)
-                radiances = view.runtime_radiance(image), view.reference_radiance()
-                metrics.append(view_metrics(image, view.reference.irradiance, *radiances, view.valid))
-        found[split] = asdict(mean_metrics(metrics))
-    return found
+    """Mean figures of the views of each split, whose images `irradiance` makes."""
+    return {
+        split: mean_metrics(
+            [view.metrics(irradiance(view)) for view in views if view.view.split == split]
+        ).as_dict()
+        for split in SPLITS
+    }
 
 
 def _rows_of(name: str, figures: Figures) -> list[Row]:

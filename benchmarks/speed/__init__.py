@@ -1,1 +1,1 @@
-"""Benchmarks of speed."""
+"""Benchmarks of speed: fits, batches, the surrogate and the passes of a frame."""

@@ -1,4 +1,4 @@
-"""A library tuned by one worker and by two, and a second run that finds everything done."""
+"""How long `vpltune batch` takes with one worker and with two, and when every scene is already done."""
 
 import json
 import os
@@ -15,17 +15,22 @@ from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import OWN_SCENES
 
 SCENES = 8
+"""Scenes of the library. A choice: two workers get the same number."""
 SECOND_RUN_LIMIT_S = 2.0
+"""Seconds of a run that has nothing to do. A choice."""
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """`efficiency_2_workers`: how much sooner two workers are done than one, every reference rendered anew
-    and each worker on one core. `second_run_s`: the whole command where every scene has its record."""
+    """The speed-up by a second worker, and the seconds of a run in which every scene has its record.
+
+    For `efficiency_2_workers`, both runs render every reference, and each worker has one core.
+    `second_run_s` times the whole command.
+    """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         varied_library(folder / "library", SCENES)
         varied_library(folder / "first", 1)
-        # What a machine does once: finding Mitsuba's LLVM, compiling the fit.
+        # Work that a machine does once: finding Mitsuba's LLVM and compiling the fit.
         _batch_seconds(folder / "first", folder, "machine", 1)
         seconds = {}
         for index, workers in enumerate((1, 2)):
@@ -40,7 +45,10 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 
 
 def varied_library(folder: Path, count: int) -> None:
-    """Our own scenes in turn, each time with its light a little brighter: another scene to every cache."""
+    """Write `count` scenes into `folder`: the shipped ones in turn, each copy with slightly brighter lights.
+
+    A different light makes a different scene for every cache.
+    """
     folder.mkdir()
     for index in range(count):
         source = OWN_SCENES[index % len(OWN_SCENES)]
@@ -57,7 +65,10 @@ def varied_library(folder: Path, count: int) -> None:
 
 
 def _batch_seconds(library: Path, folder: Path, name: str, workers: int) -> float:
-    """Wall time of the whole command; references are kept apart by `name`, what is compiled is not."""
+    """Wall-clock seconds of the whole command.
+
+    Runs with different `name` share no references; compiled functions are copied from the run "machine".
+    """
     cache = folder / f"{name}.cache"
     if not cache.exists() and (folder / "machine.cache").exists():
         shutil.copytree(
@@ -73,5 +84,5 @@ def _batch_seconds(library: Path, folder: Path, name: str, workers: int) -> floa
     )
     seconds = time.perf_counter() - started
     if json.loads(finished.stdout)["status"] != "ok":
-        raise RuntimeError(f"the batch did not end well: {finished.stdout.decode()}")
+        raise RuntimeError(f"the batch did not finish every scene: {finished.stdout.decode()}")
     return seconds

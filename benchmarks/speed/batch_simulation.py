@@ -1,11 +1,16 @@
-"""How a batch of 1,000 and of 100,000 scenes goes on 10 and on 1,000 workers: real costs, simulated queue.
+"""How long batches of 1,000 and 100,000 scenes take on 10 and 1,000 workers: a simulated queue.
 
-Assumed: a scene costs what one of `MEASURED` did, and what rendering references did in the cheapest and in
-the dearest scene tried, or anything between (uniform in the logarithm); times e^N(0, 0.25) for what differs
-between machines; 2 % of the scenes are refused, 0.3 % crash halfway through every attempt, 0.1 % hang until
-they are stopped; each worker first loads and compiles for `STARTUP_S`; the head hashes scenes on `HEAD_CORES`
-cores. Measured as this runs: hashing, looking through and reading records, and what the head does for each
-scene that ends.
+The simulation assumes:
+
+- A scene takes the seconds of one of `MEASURED`, plus the seconds of rendering its references, which are
+  log-uniform between the cheapest and the most expensive scene tried. Differences between machines multiply
+  both by e^N(0, 0.25).
+- 2 % of the scenes are rejected, 0.3 % crash halfway through every attempt, and 0.1 % hang until they are
+  stopped.
+- A worker first loads and compiles for `STARTUP_S`, and the head node hashes scenes on `HEAD_CORES` cores.
+
+The benchmark measures the head node's own work: hashing, listing and reading records, and the bookkeeping for
+each scene that ends.
 """
 
 import hashlib
@@ -41,42 +46,70 @@ MEASURED = (
     (825860, 27.4),
     (2562744, 40.0),
 )
-"""Bytes of a scene and all it refers to, and seconds of `vpltune batch`: real scenes, references kept, one
-core each of two that others used as well."""
+"""Bytes of a real scene with all files it refers to, and seconds that `vpltune batch` took for it on one core
+of a shared two-core machine, with its references cached."""
 REFERENCE_S = (12.8, 133.7)
-"""Rendering three references, on one such core: a Cornell box and a closed level of a game."""
+"""Seconds to render three references on one such core: of a Cornell box, and of a closed level of a game."""
 STARTUP_S = 8.0
+"""Seconds until a worker begins its first scene. An assumption."""
 HEAD_CORES = 16
+"""Cores of the head node. An assumption."""
 ATTEMPTS = 4
+"""Attempts at a scene that crashes. An assumption."""
 REFUSED, CRASHING, HANGING = 0.02, 0.003, 0.001
+"""Shares of scenes that are rejected, that crash and that hang. Assumptions."""
 REFUSED_S = 0.2
+"""Seconds until a scene is rejected. An assumption."""
 SCATTER = 0.25
+"""Standard deviation of the logarithm of a machine's speed. An assumption."""
 SIZES = ((1_000, 10), (1_000, 1_000), (100_000, 10), (100_000, 1_000))
+"""Scenes and workers of each simulated batch. A choice."""
 RECORDS = 5_000
+"""Records in the folder that the head's work is timed on. A choice."""
 FORMER_SCENE_SECONDS = 3600.0
+"""An earlier time limit of a scene, kept for comparison."""
+LISTING_LIMIT_S = 2.0
+"""Seconds to list 100,000 records. A choice."""
+HEAD_LIMIT_MS = 6.0
+"""Milliseconds of the head for each scene. With 1,000 workers, that is a new scene for each of them every six
+seconds, and real scenes take longer."""
 
 
 @dataclass(frozen=True)
 class Head:
-    """What the head node does one after another, in seconds."""
+    """Seconds of the head node's work, which it does one step after another."""
 
     per_byte: float
-    """Hashing, one core."""
+    """Hashing on one core."""
     per_ended_scene: float
-    """Its record read, a line written to the log."""
+    """Reading the scene's record and writing a line to the log."""
     per_known_record: float
-    """Looking through the folder."""
+    """Listing the folder of records."""
     per_read_record: float
-    """The summary at the end."""
+    """Reading a record for the summary at the end."""
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """Hours from the command to its summary against all work shared out evenly; then what each rule is worth
-    at the largest size, as hours without it."""
+    """Hours from the command to its summary, against all work divided evenly among the workers.
+
+    The last rows tell what each scheduling rule is worth: the hours of the largest batch without it.
+    """
     head = measured_head()
     made = [
-        Row("simulated_look_through_100000_records_s", 100_000 * head.per_known_record, "s", "limit", 2.0),
-        Row("simulated_head_per_scene_ms", 1e3 * head.per_ended_scene, "ms", "1,000 workers' share", 6.0),
+        Row(
+            "simulated_look_through_100000_records_s",
+            100_000 * head.per_known_record,
+            "s",
+            "limit",
+            LISTING_LIMIT_S,
+        ),
+        Row(
+            "simulated_head_per_scene_ms",
+            1e3 * head.per_ended_scene,
+            "ms",
+            "limit for 1,000 workers",
+            HEAD_LIMIT_MS,
+        ),
     ]
     for index, (scenes, workers) in enumerate(SIZES):
         progress("simulation", index / len(SIZES))
@@ -100,27 +133,27 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 
 @dataclass(frozen=True)
 class DrawnLibrary:
-    """Scenes drawn at random, as arrays."""
+    """A random library: an array of each property of its scenes."""
 
     bytes: Float64[np.ndarray, " scenes"]
     plain_seconds: Float64[np.ndarray, " scenes"]
-    """Of every attempt at scenes that do not hang."""
+    """Seconds of all attempts together, for scenes that do not hang."""
     hanging: Float64[np.ndarray, " scenes"]
     """1 where a scene hangs, else 0."""
 
     def seconds(self, hang_seconds: float = MOST_PASSED * SCENE_SECONDS) -> Float64[np.ndarray, " scenes"]:
-        """What a worker spends on each scene."""
+        """Seconds that a worker spends on each scene."""
         return np.where(self.hanging > 0.0, hang_seconds, self.plain_seconds)
 
 
 def drawn_library(scenes: int, random: np.random.Generator) -> DrawnLibrary:
-    """Scenes like the measured ones; some are refused, crash or hang."""
+    """Draw `scenes` scenes like the measured ones; some of them are rejected, crash or hang."""
     measured = np.array(MEASURED, np.float64)[random.integers(0, len(MEASURED), scenes)]
     references = np.exp(random.uniform(*np.log(REFERENCE_S), scenes))
     seconds = (measured[:, 1] + references) * np.exp(random.normal(0.0, SCATTER, scenes))
     fate = random.uniform(0.0, 1.0, scenes)
     crashing = (fate >= REFUSED) & (fate < REFUSED + CRASHING)
-    # Halfway, four times, and a new process each time.
+    # Each of the attempts gets halfway and costs a new process.
     seconds = np.where(crashing, ATTEMPTS * (0.5 * seconds + STARTUP_S), seconds)
     seconds = np.where(fate < REFUSED, REFUSED_S, seconds)
     hanging = (fate >= 1.0 - HANGING).astype(np.float64)
@@ -137,9 +170,15 @@ def batch_hours(
     head_cores: int = HEAD_CORES,
     dealt: bool = False,
 ) -> float:
-    """Hours from the command to its summary: hashing, the queue, and the records read at the end.
+    """Hours from the command to its summary: hashing, the queue, and reading all records at the end.
 
-    The head takes in one ended scene after another; a worker has its next scene only then.
+    The head processes ended scenes one after another, and a worker gets its next scene only after that.
+
+    Args:
+        largest_first: whether large scenes are started first; else in the order of the list.
+        hang_seconds: seconds that a hanging scene occupies its worker.
+        head_cores: cores that hash.
+        dealt: whether each worker gets a fixed share of the scenes at the start.
     """
     seconds = library.seconds(hang_seconds)
     if largest_first:
@@ -155,7 +194,7 @@ def batch_hours(
 
 
 def _queue_seconds(seconds: Float64[np.ndarray, " scenes"], workers: int, per_ended_scene: float) -> float:
-    """When the last scene is taken in: whoever is free has the next of the queue."""
+    """Seconds until the head has processed the last scene, if a free worker takes the next of the queue."""
     waiting = iter(seconds.tolist())
     running = [STARTUP_S + cost for _, cost in zip(range(workers), waiting, strict=False)]
     heapq.heapify(running)
@@ -172,7 +211,7 @@ def _queue_seconds(seconds: Float64[np.ndarray, " scenes"], workers: int, per_en
 
 
 def measured_head() -> Head:
-    """Times this machine, on a folder of `RECORDS` records."""
+    """Time this machine's work as a head node, on a folder of `RECORDS` records."""
     block = bytes(1 << 26)
     started = time.perf_counter()
     hashlib.sha256(block)
@@ -205,6 +244,6 @@ def _write_records(records: Records, folder: Path) -> list[str]:
             key, f"/library/scene{index}.glb", f"scene{index}.glb", "done", "the loss has settled",
             6.0, 1, f"scenes/scene{index}-{key[:12]}", "node", "2026-01-01T00:00:00.000+00:00", 0, stages,
         )  # fmt: skip
-        # As `Records.write` does it, but for the wait until the disk has it.
+        # As `Records.write`, but without waiting for the disk.
         records.path(key).write_text(json.dumps(asdict(record)))
     return keys

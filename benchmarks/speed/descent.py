@@ -1,7 +1,8 @@
-"""Whether a fit of the falloff ends at the same place wherever it starts, and in how many steps.
+"""Whether a fit of the falloff ends at the same loss wherever it starts, and how many steps it takes.
 
-Every scene that can be loaded, four views, the default config: from `STARTS` random points of the unit cube,
-and from the defaults, there beside Adam (Kingma and Ba 2015), which moves k like the others.
+Every scene is fitted with four views and the default config, from `STARTS` random points of the unit cube and
+from the defaults. From the defaults, Adam (Kingma and Ba 2015) runs too; it moves k by gradient, as it does
+the other parameters.
 """
 
 from collections.abc import Callable
@@ -26,16 +27,20 @@ from vpltune.tuner.fitting.fit_views import FitView, robust_errors
 from vpltune.tuner.fitting.search_space import SearchSpace
 
 STARTS = 64
+"""Random starting points. A choice."""
 CLOSE = 1e-3
-"""Of the least loss known: what counts as having reached it."""
+"""Relative distance to the least known loss below which a fit has reached it. A choice."""
 ADAM_STEPS = 1000
+"""Steps of Adam. A choice: more than it needs."""
 ADAM_RATES = (0.01, 0.03, 0.1)
-"""Of the cube's side; the one that is there first counts."""
+"""Adam's step sizes, in sides of the unit cube. A choice: the fastest of the three counts."""
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """For each scene: the share of starts that reach the least loss known; the steps from the defaults, ours
-    against Adam's. Then the least share and the median and the most steps."""
+    """For each scene, the share of starts that reach the least known loss, and our steps against Adam's.
+
+    The last rows are the least share, and the median and the largest number of steps over all scenes.
+    """
     scenes = present_scenes()
     made = []
     for index, (name, path) in enumerate(scenes.items()):
@@ -64,7 +69,7 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 
 
 def scene_rows(name: str, views: tuple[FitView, ...]) -> list[Row]:
-    """Of one scene, whose views are ready to be fitted."""
+    """The two rows of the scene `name`, given its views ready to be fitted."""
     default, space = ArtistParameters(), SearchSpace()
     random = np.random.default_rng(0)
     ends = [
@@ -84,7 +89,7 @@ def scene_rows(name: str, views: tuple[FitView, ...]) -> list[Row]:
         Row(f"reached.{name}", float(reached), "1", f"all {STARTS} starts", 1.0),
         Row(
             f"steps.{name}",
-            # The first of its losses is the start's, before the closed form of k.
+            # The first loss is that of the start, before the closed form of k.
             steps_to(ours.losses[1:], least),
             "steps",
             "adam",
@@ -94,14 +99,14 @@ def scene_rows(name: str, views: tuple[FitView, ...]) -> list[Row]:
 
 
 def steps_to(losses: Float[np.ndarray, " steps"], least: float) -> float:
-    """Steps until a loss is close to `least`, the first loss being that of no step; inf where none is."""
+    """Steps until the loss is close to `least`; `losses` begins with the loss before any step. Else inf."""
     close = np.flatnonzero(losses <= least + CLOSE * abs(least))
     return float(close[0]) if close.size else float("inf")
 
 
 @partial(jax.jit, static_argnums=0)
 def _adam(residuals: Residuals, data: Data, start: Array, rate: Array) -> Array:
-    """Σ residuals² before each of the steps."""
+    """The sum of squared residuals before each step of Adam."""
     optimiser = optax.adam(rate)
 
     def squares(point: Array) -> Array:

@@ -1,4 +1,4 @@
-"""How long a fit takes: the shipped Cornell box with a cold and a warm reference cache, and one step."""
+"""How long a fit takes: the shipped Cornell box with an empty and a filled cache, and one step of a fit."""
 
 import json
 import os
@@ -14,7 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from benchmarks.harness.row import Row
-from benchmarks.harness.scene_library import REPOSITORY
+from benchmarks.harness.scene_library import own_scene
+from benchmarks.speed.lit_corner import lit_corner
 from vpltune.tuner.metrics.relative_squared_error import target_of, weighted_squared_error
 from vpltune.tuner.surrogate.reduced_gather import ReducedGather, reduce_gather, reduced_image
 from vpltune.tuner.surrogate.tabulated_gather import gather_tabulated, tabulate_gather
@@ -22,15 +23,24 @@ from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPoint
 from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, gather_pairwise
 
 COLD_LIMIT_S = 60.0
+"""Seconds for a scene that was never fitted. A choice: a minute is short enough to wait for."""
 WARM_LIMIT_S = 10.0
+"""Seconds once references and compiled functions are cached. A choice: fits are repeated while one works."""
 RECEIVERS = 16_384
+"""Receivers of the timed step: four times those that a fit takes from one view."""
 VPLS = 1_024
+"""VPLs of the timed step: the default count."""
 REPEATS = 20
+"""Runs of the reduced step, and a fifth as many of the pairwise one. A choice."""
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """`fit_cold_s`, `fit_warm_s`: the whole command, Python's start included. `step_vs_pairwise`: one value
-    and gradient of the loss for 16,384 receivers and 1,024 VPLs, tabulated and reduced against by pairs."""
+    """Seconds of a fit against limits, and milliseconds of a step against a step over all pairs.
+
+    `fit_cold_s` and `fit_warm_s` time the whole command, including the start of Python. `step_vs_pairwise`
+    times the loss and its gradient for 16,384 receivers and 1,024 VPLs: from the reduced least-squares
+    problem, against a sum over all pairs of receiver and VPL.
+    """
     progress("fit", 0.0)
     with tempfile.TemporaryDirectory() as folder:
         cold = _fit_seconds(Path(folder))
@@ -47,22 +57,22 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 
 
 def _fit_seconds(folder: Path) -> float:
-    """Wall time of `vpltune fit` on the Cornell box with its caches in `folder`."""
-    scene = REPOSITORY / "configs" / "scenes" / "cornell-box.glb"
-    command = [sys.executable, "-m", "vpltune", "fit", str(scene), "-o", str(folder / "out"), "--json"]
+    """Run `vpltune fit` on the Cornell box with its caches in `folder`, and return its wall-clock seconds."""
+    scene = str(own_scene("cornell-box"))
+    command = [sys.executable, "-m", "vpltune", "fit", scene, "-o", str(folder / "out"), "--json"]
     started = time.perf_counter()
     finished = subprocess.run(
         command, env={**os.environ, "VPLTUNE_CACHE": str(folder / "cache")}, capture_output=True, check=True
     )
     seconds = time.perf_counter() - started
     if json.loads(finished.stdout)["status"] not in ("improved", "kept"):
-        raise RuntimeError(f"the fit did not end well: {finished.stdout.decode()}")
+        raise RuntimeError(f"the fit ended neither improved nor kept: {finished.stdout.decode()}")
     return seconds
 
 
 def _step_milliseconds() -> tuple[float, float]:
-    """Median milliseconds of one value and gradient, reduced and pairwise, taken in turn."""
-    receivers, vpls = corner(np.random.default_rng(0), RECEIVERS, VPLS)
+    """Median milliseconds of the loss and its gradient, reduced and pairwise; the two are timed in turns."""
+    receivers, vpls = lit_corner(np.random.default_rng(0), RECEIVERS, VPLS)
     start = FalloffParameters(*map(jnp.float32, (1.0, 0.5, 0.1)))
     table = tabulate_gather(receivers, vpls)
     truth = np.asarray(gather_tabulated(table, FalloffParameters(*map(jnp.float32, (0.8, 1.0, 0.3)))))
@@ -86,29 +96,5 @@ def _step_milliseconds() -> tuple[float, float]:
             started = time.perf_counter()
             jax.block_until_ready(step(start, data))
             times[name].append(1e3 * (time.perf_counter() - started))
-    # The first of each compiles.
+    # The first run of each compiles.
     return float(np.median(times["reduced"][1:])), float(np.median(times["pairwise"][1:]))
-
-
-def corner(
-    random: np.random.Generator, receiver_count: int, vpl_count: int
-) -> tuple[Receivers, VirtualPointLights]:
-    """Receivers on a floor, VPLs on the two walls that meet it, all of size 2 L."""
-    floor = np.concatenate(
-        [random.uniform(0.0, 2.0, (receiver_count, 2)), np.zeros((receiver_count, 1))], axis=1
-    )
-    wall = np.concatenate([np.zeros((vpl_count, 1)), random.uniform(0.0, 2.0, (vpl_count, 2))], axis=1)
-    on_other = np.arange(vpl_count) % 2 == 1
-    wall[on_other] = wall[on_other][:, [1, 0, 2]]
-    normals = np.where(on_other[:, None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
-    flux = random.uniform(0.5, 1.5, (vpl_count, 3)) / vpl_count
-    footprint = np.sqrt(8.0 / vpl_count / np.pi) * random.uniform(0.5, 2.0, vpl_count)
-
-    def array(values: np.ndarray) -> jax.Array:
-        return jnp.asarray(values, jnp.float32)
-
-    up = np.tile([0.0, 0.0, 1.0], (receiver_count, 1))
-    return (
-        Receivers(array(floor), array(up)),
-        VirtualPointLights(array(wall), array(normals), array(footprint), array(flux)),
-    )

@@ -1,4 +1,4 @@
-"""The runtime's speed: dynamic lights, gather, VPL placement, the whole indirect path, and every pass."""
+"""The speed of the runtime: dynamic lights, VPL placement, gather, indirect light, and every pass."""
 
 from collections.abc import Callable
 
@@ -9,5 +9,5 @@ from benchmarks.speed.runtime_passes import pass_rows
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """Every row of the light pre-pass, of gather and placement, then of one frame's passes."""
+    """The rows of the light pre-pass, of placement and gather, and of each pass of a frame."""
     return [*light_rows(progress), *gather_rows(progress), *pass_rows(progress)]

@@ -1,204 +1,162 @@
-"""VPL placement, gather and the whole indirect path: interleaved against full, GPU against read-back."""
+"""VPL placement, gather and the whole indirect path: interleaved against full, GPU against read-back.
+
+Milliseconds are medians of a few frames, pass by pass. A row that covers several passes is their sum. The sum
+is an upper bound, because passes overlap in a real frame.
+"""
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import moderngl
 import numpy as np
 
 from benchmarks.harness.row import Row
-from benchmarks.harness.scene_library import present_scenes
+from benchmarks.harness.scene_library import present_scenes, scene_and_view
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, Visibility
 from vpltune.renderer.frame.capture import read_image
-from vpltune.renderer.frame.frame import Frame, frame_light_records
+from vpltune.renderer.frame.frame_timing import frame_milliseconds
 from vpltune.renderer.frame.runtime import Runtime
-from vpltune.renderer.frame.runtime_options import RuntimeOptions
 from vpltune.renderer.gpu.gpu_context import create_context
-from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.light_faces import LightRecords
-from vpltune.renderer.scene.placement import resolve_camera_and_lights
-from vpltune.renderer.scene.views import View
 from vpltune.renderer.techniques.vpls_readback import VplsReadback
+from vpltune.tuner.metrics.view_metrics import relmse
 
 SIZE = (640, 360)
+"""Width and height of the image in pixels. A choice: a ninth of 1080p, for software renderers."""
 SIZE_1080P = (1920, 1080)
+"""Width and height of the image of the row `frame_1080p_1024vpl`."""
 VPL_COUNT = 1024
+"""VPLs: the default count."""
+INTERLEAVE = 4
+"""Pixels along the side of an interleaved block. A choice."""
+FRAMES = 2
+"""Timed frames after one that is not timed. A choice: a software renderer needs seconds for one."""
 READBACK_DRAWS = 128
-"""VPLs drawn one by one; their time is stated for `VPL_COUNT`."""
-_PARAMETERS = ArtistParameters(vpl_count=VPL_COUNT, screen_space_strength=1.0)
+"""VPLs that are drawn one by one; their time is scaled to `VPL_COUNT`. A choice."""
+WARM_UP_DRAWS = 4
+"""VPLs of an untimed draw before. A choice."""
 HARD_SCENES = ("sketchfab-macross-diorama", "playcanvas-chess-board", "bevy-mixedlightingexample")
-"""Where interleaving has it hardest: small parts and round bodies, whose windows lack subsets."""
+"""The hardest scenes for interleaving: in windows on small parts and round objects, subsets are missing."""
 TARGET_MS = 1.0
-"""The whole indirect path at 1080p with 1,024 VPLs on a data-centre GPU."""
+"""Target for the whole indirect path at 1080p with 1,024 VPLs on a data-centre GPU, in milliseconds."""
+PLACEMENT_PASSES = ("virtual_point_lights",)
+GATHER_PASSES = ("vpl_gather", "interleaved_filter")
+INDIRECT_PASSES = (
+    "reflective_shadow_map",
+    *PLACEMENT_PASSES,
+    *GATHER_PASSES,
+    "screen_space_indirect",
+    "screen_space_filter",
+)
+"""All passes that indirect light adds to a frame without visibility maps."""
 
 
 def gather_rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """Rows of placement and gather; milliseconds of the best of a few runs."""
+    """The rows of placement, gather and the indirect path."""
     with create_context() as context:
         return _rows(context, progress)
 
 
 def _rows(context: moderngl.Context, progress: Callable[[str, float], None]) -> list[Row]:
     paths = present_scenes()
-    scene = _BenchmarkScene(context, paths["gallery"])
     progress("full gather", 0.0)
-    drawn = scene.drawn(SIZE, RuntimeOptions(), "none")
-    full = _full_gather(context, drawn, repeats=2)
+    scene = _MeasuredScene(context, paths["gallery"])
+    full = scene.milliseconds(SIZE, _config(1))
+    gather = _sum(full, GATHER_PASSES)
     progress("one draw for each VPL", 0.25)
-    read, placed, one_by_one = _readback_milliseconds(context, drawn)
-    progress("VPL placement", 0.35)
-    placement = _milliseconds(context, lambda: _place(drawn), repeats=5)
+    read, placed, one_by_one = scene.readback_milliseconds(_config(1))
     progress("interleaved gather", 0.4)
     rows = [
-        _interleaved_row(context, "gather_interleaved_4x4", scene, "none", full),
+        scene.interleaved_row("gather_interleaved_4x4", "transmittance", gather),
         Row(
             "gather_full",
-            full.milliseconds,
+            gather,
             "ms",
             f"one additive draw per VPL, from {READBACK_DRAWS}, without maps",
             one_by_one,
         ),
         Row(
             "vpls_gpu",
-            placement,
+            _sum(full, PLACEMENT_PASSES),
             "ms",
             f"vpls_readback: RSM read back {read:.3g} ms, Poisson-disc VPLs made on the CPU",
             read + placed,
         ),
     ]
     progress("indirect path at 1080p", 0.45)
-    drawn = scene.drawn(SIZE_1080P, RuntimeOptions(interleave=4), "none")
-    whole = _indirect_milliseconds(context, drawn)
+    whole = _sum(scene.milliseconds(SIZE_1080P, _config(INTERLEAVE, near_field=True)), INDIRECT_PASSES)
     rows.append(
         Row("frame_1080p_1024vpl", whole, "ms", "target on a data-centre GPU, without maps", TARGET_MS)
     )
-    others = [("gallery", "maps"), *((name, mode) for name in HARD_SCENES for mode in ("none", "maps"))]
+    modes: tuple[Visibility, ...] = ("transmittance", "maps")
+    others = [("gallery", "maps"), *((name, mode) for name in HARD_SCENES for mode in modes)]
     others = [(name, mode) for name, mode in others if name in paths]
     for index, (name, mode) in enumerate(others):
         progress(f"interleaved gather, {name}", 0.6 + 0.4 * index / len(others))
-        scene = _BenchmarkScene(context, paths[name])
-        full = _full_gather(context, scene.drawn(SIZE, RuntimeOptions(), mode), repeats=1)
         suffix = "_maps" if mode == "maps" else ""
-        rows.append(_interleaved_row(context, f"gather_interleaved_4x4_{name}{suffix}", scene, mode, full))
+        scene = _MeasuredScene(context, paths[name])
+        gather = _sum(scene.milliseconds(SIZE, _config(1, mode)), GATHER_PASSES)
+        rows.append(scene.interleaved_row(f"gather_interleaved_4x4_{name}{suffix}", mode, gather))
     return rows
 
 
-class _BenchmarkScene:
-    """A scene on the GPU, by its own camera and lights, or those placed for it."""
+def _config(
+    interleave: int, visibility: Visibility = "transmittance", *, near_field: bool = False
+) -> TunedConfig:
+    parameters = ArtistParameters(vpl_count=VPL_COUNT, screen_space_strength=1.0 if near_field else 0.0)
+    return TunedConfig(parameters, visibility=visibility, quality=Quality(interleave=interleave))
+
+
+def _sum(milliseconds: dict[str, float], passes: Sequence[str]) -> float:
+    """The milliseconds of those of `passes` that ran."""
+    return sum(milliseconds.get(name, 0.0) for name in passes)
+
+
+class _MeasuredScene:
+    """A scene on the GPU, seen by its own camera and lights, or by placed ones where it has none."""
 
     def __init__(self, context: moderngl.Context, path: Path):
-        self._scene = read_scene(path)
         self._context = context
-        self._camera, self._lights, _ = resolve_camera_and_lights(self._scene, path, None, None)
+        scene, self._view = scene_and_view(path, SIZE)
+        self._runtime = Runtime(scene, context=context)
 
-    def drawn(self, size: tuple[int, int], options: RuntimeOptions, visibility: Visibility) -> "_Drawn":
-        """A frame that has been drawn once, so that shaders are compiled and buffers filled."""
-        config = TunedConfig(_PARAMETERS, visibility=visibility)
-        runtime = Runtime(self._scene, config, options, context=self._context)
-        view = View("gather", "fitted", size, self._camera, self._lights)
-        frame = runtime._draw(view)
-        self._context.finish()
-        return _Drawn(frame, view, frame_light_records(runtime.scene_buffers, view))
+    def milliseconds(self, size: tuple[int, int], config: TunedConfig) -> dict[str, float]:
+        """Milliseconds of each pass of an image of `size` pixels."""
+        return self._runtime.pass_milliseconds(replace(self._view, size=size), config, FRAMES)
 
+    def interleaved_row(self, name: str, visibility: Visibility, full: float) -> Row:
+        """The interleaved gather with its filter, against the `full` milliseconds of a full gather."""
+        config = _config(INTERLEAVE, visibility)
+        taken = _sum(self.milliseconds(SIZE, config), GATHER_PASSES)
+        image, expected = self._image(config), self._image(_config(1, visibility))
+        seen = expected[..., 3] > 0.0
+        error = relmse(image[seen][:, :3], expected[seen][:, :3])
+        maps = "with visibility maps" if visibility == "maps" else "without maps"
+        return Row(name, taken, "ms", f"gather_full, {maps}; relMSE {error:.2g}", full)
 
-@dataclass(frozen=True, eq=False)
-class _Drawn:
-    """A drawn frame, what it shows, and the lights that are bound."""
+    def readback_milliseconds(self, config: TunedConfig) -> tuple[float, float, float]:
+        """Milliseconds to read the RSM back, to make VPLs of it on the CPU, and to draw all of them.
 
-    frame: Frame
-    view: View
-    records: LightRecords
+        The first two block the CPU until the GPU is idle.
+        """
+        drawn, context = self._runtime.draw(self._view, config), self._context
+        readback = VplsReadback(drawn.frame, VPL_COUNT)
+        context.finish()
+        start = time.perf_counter()
+        texels = readback.read()
+        read = time.perf_counter()
+        vpls = readback.place(texels, drawn.inputs.records)
+        placed = time.perf_counter()
+        readback.draw(drawn.inputs, vpls[:WARM_UP_DRAWS])
+        draws = frame_milliseconds(
+            context, lambda: readback.draw(drawn.inputs, vpls[:READBACK_DRAWS]), frames=1
+        )
+        return 1e3 * (read - start), 1e3 * (placed - read), draws * VPL_COUNT / READBACK_DRAWS
 
-
-def _milliseconds(context: moderngl.Context, draw: Callable[[], object], repeats: int) -> float:
-    """The best of some runs: by GPU timers, but by the wall clock on llvmpipe, where they under-report."""
-    wall_clock = "llvmpipe" in context.info["GL_RENDERER"]
-    best = np.inf
-    for _ in range(repeats):
-        if wall_clock:
-            start = time.perf_counter()
-            draw()
-            context.finish()
-            taken = 1e3 * (time.perf_counter() - start)
-        else:
-            query = context.query(time=True)
-            with query:
-                draw()
-            taken = 1e-6 * query.elapsed
-        best = min(best, taken)
-    return best
-
-
-def _gather_milliseconds(context: moderngl.Context, drawn: _Drawn, repeats: int) -> float:
-    """Gather, and where it is interleaved, filter and the listed pixels' full gather."""
-    camera = drawn.frame.camera(drawn.view)
-    return _milliseconds(context, lambda: drawn.frame._gather(camera), repeats)
-
-
-@dataclass(frozen=True, eq=False)
-class _FullGather:
-    """What an interleaved gather is measured against."""
-
-    milliseconds: float
-    image: np.ndarray
-
-
-def _full_gather(context: moderngl.Context, drawn: _Drawn, repeats: int) -> _FullGather:
-    milliseconds = _gather_milliseconds(context, drawn, repeats)
-    return _FullGather(milliseconds, read_image(drawn.frame.vpl_irradiance))
-
-
-def _interleaved_row(
-    context: moderngl.Context, name: str, scene: _BenchmarkScene, visibility: Visibility, full: _FullGather
-) -> Row:
-    drawn = scene.drawn(SIZE, RuntimeOptions(interleave=4), visibility)
-    milliseconds = _gather_milliseconds(context, drawn, repeats=3)
-    error = _relative_error(read_image(drawn.frame.vpl_irradiance), full.image)
-    maps = "with visibility maps" if visibility == "maps" else "without maps"
-    return Row(name, milliseconds, "ms", f"gather_full, {maps}; relMSE {error:.2g}", full.milliseconds)
-
-
-def _place(drawn: _Drawn) -> None:
-    """From RSM to VPLs: densities, scene length and placement."""
-    frame, origin = drawn.frame, drawn.records.moment_origin
-    frame.virtual_point_lights.distribute(frame.rsm, origin)
-    frame.virtual_point_lights.draw(frame.rsm, (0.0, 0.0))
-
-
-def _readback_milliseconds(context: moderngl.Context, drawn: _Drawn) -> tuple[float, float, float]:
-    """Reading the RSM back; making the VPLs of it; drawing them one by one. The first two wait."""
-    readback = VplsReadback(context, drawn.frame, VPL_COUNT)
-    context.finish()
-    start = time.perf_counter()
-    texels = readback.read()
-    read = time.perf_counter()
-    vpls = readback.place(texels, drawn.records)
-    placed = time.perf_counter()
-    readback.draw(drawn.view, vpls[:4], _PARAMETERS)
-    one_by_one = _milliseconds(
-        context, lambda: readback.draw(drawn.view, vpls[:READBACK_DRAWS], _PARAMETERS), repeats=1
-    )
-    return 1e3 * (read - start), 1e3 * (placed - read), one_by_one * VPL_COUNT / READBACK_DRAWS
-
-
-def _indirect_milliseconds(context: moderngl.Context, drawn: _Drawn) -> float:
-    """RSM, VPLs, gather, filter and screen-space near field: all that indirect light adds to a frame."""
-    frame, camera = drawn.frame, drawn.frame.camera(drawn.view)
-
-    def indirect_path() -> None:
-        frame._reflective_shadow_map.draw(frame.rsm)
-        _place(drawn)
-        frame._gather(camera)
-        frame._add_near_field(camera, len(drawn.view.lights), None)
-
-    return _milliseconds(context, indirect_path, repeats=2)
-
-
-def _relative_error(image: np.ndarray, reference: np.ndarray) -> float:
-    """relMSE of irradiance (vpltune.tuner.metrics.view_metrics) where a surface is seen."""
-    seen = reference[..., 3] > 0.0
-    y, r = image[seen][:, :3].astype(np.float64), reference[seen][:, :3].astype(np.float64)
-    return float(np.mean((y - r) ** 2 / (r**2 + 0.01 * r.mean() ** 2)))
+    def _image(self, config: TunedConfig) -> np.ndarray:
+        """The irradiance of the VPLs, RGBA; alpha is 1 where the camera sees a surface."""
+        drawn = self._runtime.draw(self._view, config)
+        return read_image(drawn.frame.resources, "vpl_irradiance")

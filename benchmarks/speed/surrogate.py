@@ -1,4 +1,4 @@
-"""The surrogate's throughput against this machine's own matrix product, and its memory for many VPLs."""
+"""The surrogate's throughput against this machine's matrix product, and its peak memory with many VPLs."""
 
 import subprocess
 import sys
@@ -12,19 +12,28 @@ import numpy as np
 
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import REPOSITORY
-from benchmarks.speed.fit import corner
+from benchmarks.speed.lit_corner import lit_corner
 from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, gather
 from vpltune.tuner.surrogate.wide_vectors import wide_jit
 
 FLOPS_PER_PAIR = 40.0
-"""Of the gather as written: a root, an exponential and two quotients counted as a few each."""
+"""Floating-point operations for a pair of receiver and VPL, counted in the gather's code; a root, an
+exponential and a quotient each count as a few."""
 MATRIX = 2048
+"""Rows of the square matrices whose product is timed. A choice."""
 RECEIVERS = 16_384
+"""Receivers of the timed gather: four times those that a fit takes from one view."""
 VPLS = 1_024
+"""VPLs of the timed gather: the default count."""
 FORWARD_AIM = 0.25
+"""Share of the matrix product's rate that the gather should reach. A choice."""
 REPEATS = 9
+"""Timed runs, of which the fastest counts. A choice."""
 FEW_VPLS, MANY_VPLS = 256, 16_384
+"""VPL counts whose peak memory is compared. A choice: memory that grows with the
+number of pairs would grow 64-fold."""
 MEMORY_RECEIVERS = 4_096
+"""Receivers of the memory measurement: those that a fit takes from one view."""
 _PEAK = """
 import sys
 from benchmarks.speed.surrogate import one_gradient, peak_kibibytes
@@ -34,8 +43,12 @@ print(peak_kibibytes())
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """`forward_share_of_matmul`, `gradient_share_of_matmul`: pairs a second at 40 flop each, over the rate of
-    a float32 matrix product, taken in turn. `peak_memory_16384_vpls`: a process's, against one with 256."""
+    """Rates of the gather and its gradient over the matrix product's, and peak memory with many and few VPLs.
+
+    `forward_share_of_matmul` and `gradient_share_of_matmul` count 40 operations for each pair of receiver and
+    VPL, and divide by the rate of a float32 matrix product. `peak_memory_16384_vpls` compares two processes
+    that each compute one gradient.
+    """
     progress("surrogate", 0.0)
     seconds = _best_seconds()
     rate = 2.0 * MATRIX**3 / seconds["matmul"]
@@ -58,8 +71,8 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 
 
 def _best_seconds() -> dict[str, float]:
-    """The best of some runs of each, taken in turn, so that a busy moment meets them all."""
-    receivers, vpls = corner(np.random.default_rng(0), RECEIVERS, VPLS)
+    """The fastest run of each function; they run in turns, so that other load slows all of them alike."""
+    receivers, vpls = lit_corner(np.random.default_rng(0), RECEIVERS, VPLS)
     parameters = FalloffParameters(*map(jnp.float32, (1.0, 0.5, 0.1)))
     matrix = jnp.asarray(np.random.default_rng(1).random((MATRIX, MATRIX)), jnp.float32)
     runs: dict[str, Callable[[], object]] = {
@@ -72,15 +85,15 @@ def _best_seconds() -> dict[str, float]:
         for name, run in runs.items():
             started = time.perf_counter()
             jax.block_until_ready(run())
-            # The first compiles.
+            # The first run compiles.
             if repeat:
                 best[name] = min(best[name], time.perf_counter() - started)
     return best
 
 
 def one_gradient(vpls: int) -> None:
-    """One value and gradient with so many VPLs: what a process of its own is measured by."""
-    receivers, lights = corner(np.random.default_rng(0), MEMORY_RECEIVERS, vpls)
+    """Compute one gradient with `vpls` VPLs, in a process of its own whose memory is measured."""
+    receivers, lights = lit_corner(np.random.default_rng(0), MEMORY_RECEIVERS, vpls)
     parameters = FalloffParameters(*map(jnp.float32, (1.0, 0.5, 0.1)))
     jax.block_until_ready(_gradient(receivers, lights, parameters))
 
@@ -104,6 +117,6 @@ def _peak_mebibytes(vpls: int) -> float:
 
 
 def peak_kibibytes() -> int:
-    """Of this process so far. Linux's own: `getrusage` begins at what the starting process had."""
+    """Peak memory of this process, from /proc: `getrusage` would start at the parent process's peak."""
     status = Path("/proc/self/status").read_text()
     return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM:"))

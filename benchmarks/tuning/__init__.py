@@ -1,1 +1,1 @@
-"""Benchmarks of fits, searches and the prior."""
+"""Benchmarks of fits, of searches that compete with them, and of the learnt prior."""

@@ -1,11 +1,11 @@
-"""How far `auto` comes on scenes that its prior has not seen: against the defaults and each scene's own fit.
+"""How good `auto` is on scenes outside its training, against the defaults and each scene's own fit.
 
-Scenes are generated ones and those of others, as `vpltune train-prior` takes them; for each, the prior is one
-that was trained without it, and runtime images are measured against the path tracer. What each scene came
-to goes to out/auto/scenes.json.
+The scenes are generated and third-party ones, as for `vpltune train-prior`. For each scene, a prior is
+trained without it, and the runtime's images are compared with the path tracer. The figures of each scene are
+written to out/auto/scenes.json.
 
-`python -m benchmarks.tuning.auto FOLDER` writes the clip of a light that is carried from a small room into a hall,
-with the parameters plotted under the image.
+`python -m benchmarks.tuning.auto FOLDER` writes the clip of `benchmarks.quality.carried_light`, in which a
+lamp is carried from a small room into a hall.
 """
 
 import sys
@@ -23,6 +23,7 @@ from benchmarks.harness.scene_library import REPOSITORY, scenes_folder
 from benchmarks.quality.carried_light import write_carried_light
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
 from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS, AutoPrior, value_at
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.renderer.files.strict_json import strict_json
@@ -39,17 +40,26 @@ from vpltune.tuner.prior.train_prior import LearntPrior, collected_scenes, learn
 from vpltune.tuner.surrogate.compiled_functions import keep_compiled_functions
 
 GENERATED = 32
+"""Generated scenes: as many as the shipped prior is trained on."""
 VPL_COUNT = 64
+"""VPLs of every image. A choice: one of the counts that the prior is trained with."""
 SCALED_SCENES = 5
+"""Scenes that are drawn at other scales. A choice."""
 SCALES = (0.01, 100.0)
+"""Factors of the scene's size. A choice."""
 SCALE_TOLERANCE = 1e-3
-"""Relative RMSE: where rounding moves a silhouette by a pixel, it may differ."""
-WANTED_RATIO, WANTED_SHARE, WANTED_GAP = 1.15, 0.9, 0.1
+"""Relative RMSE by which an image may change with scale: rounding may move a silhouette by a pixel. A
+choice."""
+RATIO_LIMIT, SHARE_LIMIT, GAP_LIMIT = 1.15, 0.9, 0.1
+"""Limits: relMSE of `auto` over a fit's, share of scenes that are better than with the defaults, and relative
+gap between the loss on other views and on a fit's own. A choice."""
+QUALITY = Quality(rsm_resolution=RSM_RESOLUTION)
+"""The quality settings that the prior's training scenes are captured with."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Measured:
-    """One scene's relMSE by config, the mean over the fit's views and over the others."""
+    """relMSE of one scene by config: means over the views of the fit, and over the held-out views."""
 
     name: str
     auto: tuple[float, float]
@@ -58,7 +68,7 @@ class _Measured:
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """The medians, the gap between lights and views, scale, and a row for each scene."""
+    """Medians over scenes, the gap to other views, the change with scale, and a row for each scene."""
     keep_compiled_functions()
     folder = scenes_folder()
     sources = scene_sources(folder if folder.is_dir() else None, GENERATED, 0)
@@ -87,21 +97,22 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 
 
 def _measured(context: moderngl.Context, learnt: LearntPrior, index: int, scene: Scene) -> _Measured:
+    """Measure the scene with number `index` of `learnt`."""
     views = prior_views(scene)
     references = prior_references(scene, views)
-    base = ArtistParameters(**{**ArtistParameters().as_dict(), "vpl_count": VPL_COUNT})
-    fit = _at(learnt.fits.points[index, learnt.fits.vpl_counts.index(VPL_COUNT)], base)
+    default = TunedConfig(ArtistParameters(vpl_count=VPL_COUNT), quality=QUALITY)
+    point = learnt.fits.points[index, learnt.fits.vpl_counts.index(VPL_COUNT)]
     configs = {
-        "auto": TunedConfig(base, visibility="maps", auto=learnt.unseen[index]),
-        "fit": TunedConfig(fit, visibility="maps"),
-        "default": TunedConfig(base, visibility="maps"),
+        "auto": replace(default, auto=learnt.unseen[index]),
+        "fit": default.with_parameters(_at(point, default.parameters)),
+        "default": default,
     }
+    runtime = Runtime(scene, context=context)
     errors = {}
     for name, config in configs.items():
-        runtime = Runtime(scene, config, context=context, rsm_resolution=RSM_RESOLUTION)
         of_views = []
         for view, reference in zip(views, references, strict=True):
-            captured = runtime.capture(view)
+            captured = runtime.capture(view, config, maps=False)
             valid = captured.valid & reference.valid
             of_views.append(relmse(captured.indirect_irradiance[valid], reference.irradiance[valid]))
         errors[name] = tuple(
@@ -112,6 +123,7 @@ def _measured(context: moderngl.Context, learnt: LearntPrior, index: int, scene:
 
 
 def _at(point: np.ndarray, rest: ArtistParameters) -> ArtistParameters:
+    """The parameters at a point of the prior's unit cube; the others are those of `rest`."""
     values = {
         name: value_at(parameter_spec(name), float(place))
         for name, place in zip(AUTO_PARAMETERS, point, strict=True)
@@ -127,11 +139,9 @@ def _summary(measured: list[_Measured]) -> list[Row]:
     about = f"limit; median over {len(measured)} scenes outside the training set, {VPL_COUNT} VPLs"
     better = float(np.mean(auto.mean(axis=1) < default.mean(axis=1)))
     return [
-        Row("auto_over_fit_relmse", float(over_fit[1]), "1", f"{about}, on views new to both", WANTED_RATIO),
-        Row(
-            "auto_over_fit_relmse_fitted", float(over_fit[0]), "1", f"{about}, on the fit's own", WANTED_RATIO
-        ),
-        Row("beats_defaults_share", better, "of scenes", "wanted", WANTED_SHARE),
+        Row("auto_over_fit_relmse", float(over_fit[1]), "1", f"{about}, on held-out views", RATIO_LIMIT),
+        Row("auto_over_fit_relmse_fitted", float(over_fit[0]), "1", f"{about}, on fitted views", RATIO_LIMIT),
+        Row("beats_defaults_share", better, "of scenes", "limit", SHARE_LIMIT),
         Row(
             "auto_over_default_relmse",
             float(np.median(auto.mean(axis=1) / default.mean(axis=1))),
@@ -143,9 +153,10 @@ def _summary(measured: list[_Measured]) -> list[Row]:
 
 
 def _gap(learnt: LearntPrior) -> Row:
-    """A fit on half the views, each with its own light, tested on the other half, against its own fit.
+    """How much worse a fit to half the views is on the other half than that half's own fit.
 
-    Through the surrogate, at `VPL_COUNT` VPLs, with the references' noise as the floor of both.
+    Every view has its own light. Losses are the surrogate's at `VPL_COUNT` VPLs, and the references' noise is
+    added to both.
     """
     other = own_fits(learnt.scenes, held_out=True)
     which = learnt.fits.vpl_counts.index(VPL_COUNT)
@@ -159,7 +170,7 @@ def _gap(learnt: LearntPrior) -> Row:
         )
         gaps.append(tested / own - 1.0)
     return Row(
-        "fit_gap_other_half", float(np.median(gaps)), "of the loss", "limit; median over scenes", WANTED_GAP
+        "fit_gap_other_half", float(np.median(gaps)), "of the loss", "limit; median over scenes", GAP_LIMIT
     )
 
 
@@ -169,13 +180,13 @@ def _mean_loss(table: LossTable, point: np.ndarray) -> jax.Array:
 
 
 def _scale_change(context: moderngl.Context, prior: AutoPrior, scene: Scene) -> float:
-    """The largest relative RMSE between an image drawn with `auto` and the same at another scale."""
-    config = TunedConfig(ArtistParameters(vpl_count=VPL_COUNT), visibility="maps", auto=prior)
+    """The largest relative RMSE between an image drawn with `auto` and that of the scene at another scale."""
+    config = TunedConfig(ArtistParameters(vpl_count=VPL_COUNT), auto=prior, quality=QUALITY)
     (view,) = prior_views(scene)[:1]
 
     def image(factor: float) -> np.ndarray:
-        runtime = Runtime(scaled(scene, factor), config, context=context, rsm_resolution=RSM_RESOLUTION)
-        return runtime.render_radiance(scaled_view(view, factor))
+        runtime = Runtime(scaled(scene, factor), context=context)
+        return runtime.render_radiance(scaled_view(view, factor), config)
 
     plain = image(1.0)
     return max(float(np.sqrt(np.mean((image(factor) - plain) ** 2) / np.mean(plain**2))) for factor in SCALES)

@@ -1,9 +1,10 @@
-"""Error against the number of VPLs, on rotations not fitted to: uniform, default, cells and fitted.
+"""Error against VPL count, on held-out rotations of the point table: uniform, default, discs and fitted.
 
-With visibility maps, on fitted and held-out views. γ, η and the maps' parameters are fitted once for each
-scene, at `FITTED_COUNT` VPLs, the falloff at every count. Curves go to out/density/curves.{json,png}.
+All images have visibility maps, and errors are means over fitted and held-out views. γ, η and the maps'
+parameters are fitted once for each scene, at `FITTED_COUNT` VPLs; the falloff is fitted at every count. The
+curves are written to out/density/curves.json and curves.png.
 
-`python -m benchmarks.tuning.density SCENE …` does it for some of the scenes only.
+`python -m benchmarks.tuning.density SCENE …` measures only the scenes that are named.
 """
 
 import json
@@ -16,16 +17,13 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.harness.row import Row
-from benchmarks.harness.scene_library import REPOSITORY, present_scenes
+from benchmarks.harness.scene_library import REPOSITORY, present_scenes, scene_and_view
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.atomic_file import write_text_whole, written_whole
 from vpltune.renderer.frame.runtime import Runtime
-from vpltune.renderer.frame.runtime_options import RuntimeOptions
 from vpltune.renderer.gpu.gpu_context import create_context
-from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.placement import resolve_camera_and_lights
-from vpltune.renderer.scene.views import View
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene, SceneOptions, Stopwatch, prepare_scene
 from vpltune.tuner.fitting.fit_density import (
     LLOYD_ITERATIONS,
@@ -49,14 +47,21 @@ SCENES = (
     "nvpro-cornellbox",
 )
 SIZE = (64, 48)
+"""Width and height of a view in pixels: those of a fit."""
 COUNTS = (8, 16, 32, 64, 128, 256, 512, 1024)
+"""VPL counts of the curves. A choice."""
 FITTED_COUNT = 32
+"""VPLs at which γ, η and the maps' parameters are fitted. A choice."""
 DEFAULT_COUNT = 256
+"""VPLs of the default image that few fitted VPLs are compared with. A choice."""
 INTERLEAVES = (2, 4)
+"""Sides of interleaved blocks to compare. A choice."""
 ROTATIONS = 4
-"""To fit to, and as many others to measure on."""
+"""Rotations that are fitted to, and held-out ones that errors are measured on. A choice."""
 COST_SIZE = (640, 360)
+"""Width and height of the timed image in pixels. A choice: a ninth of 1080p, for software renderers."""
 COST_TURNS = 3
+"""Timed frames, of which the fastest counts. A choice."""
 COST_PASSES = (
     "vpl_importance",
     "virtual_point_lights",
@@ -66,38 +71,44 @@ COST_PASSES = (
     "interleaved_filter",
 )
 SLOPE_STEPS = 20
-"""Along η, at each of which the sign of the measured slope is compared with the smooth trend's."""
+"""Steps along η, at each of which the slope's sign is compared with that of the smooth trend. A choice."""
 LLOYD_ITERATIONS_TRIED = (1, 4, 16)
-"""Steps to measure beside those that fits take."""
+"""Lloyd iterations to compare with those of a fit. A choice."""
+LEAST_ERROR = 1e-9
+"""Errors below this count as this much, so that their logarithms are finite."""
 _UNFITTED = {
     "uniform": ArtistParameters(density_exponent=0.0),
     "default": ArtistParameters(),
-    "cells": with_discs(ArtistParameters()),
+    "discs": with_discs(ArtistParameters()),
 }
 VARIANTS = (*_UNFITTED, "fitted")
 
 Curve = dict[int, float]
+"""relMSE by VPL count."""
 Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, eq=False)
 class SceneCurves:
-    """relMSE by VPL count, means over all views and held-out rotations."""
+    """The curves of one scene, means over all views and held-out rotations."""
 
     name: str
     uniform: Curve
+    """The default, with VPLs uniform over RSM texels."""
     default: Curve
-    cells: Curve
-    """The default's, but for the cells."""
+    discs: Curve
+    """The default, with clustered disc lights."""
     fitted: Curve
     interleaved: Curve
-    """Fitted, by side of the block: FITTED_COUNT VPLs for each pixel, side² times as many in all."""
+    """relMSE of the fitted parameters by side of the interleaved block. Each pixel gathers FITTED_COUNT VPLs,
+    of side² times as many in all."""
     parameters: ArtistParameters
-    """Fitted at FITTED_COUNT."""
+    """The parameters that were fitted at FITTED_COUNT VPLs."""
 
 
 def rows(progress: Progress) -> list[Row]:
-    """For each scene and in the median: VPLs for the same error, and few tuned ones against many."""
+    """For each scene and in the median, the VPLs for equal error, and few fitted VPLs against many; then
+    costs."""
     present = present_scenes()
     names = [name for name in SCENES if name in present]
     curves = [measured_curves(name, present[name], progress) for name in names]
@@ -108,7 +119,7 @@ def rows(progress: Progress) -> list[Row]:
 
 
 def curve_rows(curves: Sequence[SceneCurves]) -> list[Row]:
-    """Of scenes that were measured."""
+    """The rows about error, from the curves of all scenes."""
     made = []
     for scene in curves:
         same = count_for_error(scene.uniform, scene.fitted[FITTED_COUNT])
@@ -127,8 +138,8 @@ def curve_rows(curves: Sequence[SceneCurves]) -> list[Row]:
                 f"tuned_32_over_discs_256.{scene.name}",
                 scene.fitted[FITTED_COUNT],
                 "relMSE",
-                f"default but for its cells at {DEFAULT_COUNT} VPLs",
-                scene.cells[DEFAULT_COUNT],
+                f"default with {DEFAULT_COUNT} clustered discs",
+                scene.discs[DEFAULT_COUNT],
             ),
             Row(
                 f"tuned_32_over_default_256.{scene.name}",
@@ -141,7 +152,7 @@ def curve_rows(curves: Sequence[SceneCurves]) -> list[Row]:
                 f"tuned_32_over_default_32.{scene.name}",
                 scene.fitted[FITTED_COUNT],
                 "relMSE",
-                "default at as many VPLs",
+                f"default at {FITTED_COUNT} VPLs",
                 scene.default[FITTED_COUNT],
             ),
         ]
@@ -162,58 +173,54 @@ def curve_rows(curves: Sequence[SceneCurves]) -> list[Row]:
 
 
 def measured_curves(name: str, path: Path, progress: Progress) -> SceneCurves:
-    """All curves of one scene."""
+    """Fit one scene, and measure all its curves."""
     prepared = _prepared(path)
     runtime, views = prepared.runtime, prepared.views
     fitted_views = [view for view in views if view.view.split == "fitted"]
     rotations = table_rotations(ROTATIONS, 0)
     progress(f"{name}: density", 0.0)
-    start = ArtistParameters(vpl_count=FITTED_COUNT)
+    start = TunedConfig(ArtistParameters(vpl_count=FITTED_COUNT))
     found = fit_density(runtime, fitted_views, start, rotations=rotations).parameters
     curves: dict[str, Curve] = {variant: {} for variant in VARIANTS}
     fits: dict[int, ArtistParameters] = {}
     for index, count in enumerate(COUNTS):
         progress(f"{name}: {count} VPLs", index / len(COUNTS))
-        drawn = replace(found, vpl_count=count)
-        tuned = _fit(rotated_views(runtime, fitted_views, drawn, rotations), drawn).parameters
+        drawn = TunedConfig(replace(found, vpl_count=count))
+        rotated = rotated_views(runtime, fitted_views, drawn, rotations)
+        tuned = _fit(rotated, drawn.parameters).parameters
         fits[count] = tuned
         for variant, parameters in (*_UNFITTED.items(), ("fitted", tuned)):
-            curves[variant][count] = _error(runtime, views, replace(parameters, vpl_count=count))
+            config = TunedConfig(replace(parameters, vpl_count=count))
+            curves[variant][count] = _error(runtime, views, config)
     curves["interleaved"] = {
-        side: _interleaved_error(prepared, fits[FITTED_COUNT * side**2], side) for side in INTERLEAVES
+        side: _error(runtime, views, _interleaved(fits[FITTED_COUNT * side**2], side)) for side in INTERLEAVES
     }
     return SceneCurves(name, **curves, parameters=found)
 
 
 def cost_rows(path: Path, progress: Progress) -> list[Row]:
-    """What VPLs cost from placement to image, frames drawn in turn: with cells, against the default.
+    """Milliseconds of all passes that VPLs pay for: few clustered discs against the default.
 
-    The rows `tuned_32_a_pixel_…` are to be read beside these.
+    The costs `cost_32_a_pixel_…` belong to the errors `tuned_32_a_pixel_…`. Frames are drawn in turns, so
+    that other load on the machine slows all of them alike.
     """
-    scene = read_scene(path)
-    camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
-    view = View("cost", "fitted", COST_SIZE, camera, lights)
-    cells = with_discs(ArtistParameters())
-    drawn = {
-        "32": (replace(cells, vpl_count=FITTED_COUNT), 1),
-        **{f"32_a_pixel_{s}x{s}": (replace(cells, vpl_count=FITTED_COUNT * s**2), s) for s in INTERLEAVES},
-        "default": (ArtistParameters(vpl_count=DEFAULT_COUNT), 1),
+    scene, view = scene_and_view(path, COST_SIZE)
+    discs = with_discs(ArtistParameters())
+    configs = {
+        "32": TunedConfig(replace(discs, vpl_count=FITTED_COUNT)),
+        **{
+            f"32_a_pixel_{side}x{side}": _interleaved(replace(discs, vpl_count=FITTED_COUNT * side**2), side)
+            for side in INTERLEAVES
+        },
+        "default": TunedConfig(ArtistParameters(vpl_count=DEFAULT_COUNT)),
     }
-    best = dict.fromkeys(drawn, np.inf)
+    best = dict.fromkeys(configs, np.inf)
     with create_context() as context:
-        runtimes = {
-            name: Runtime(
-                scene,
-                TunedConfig(parameters, visibility="maps"),
-                RuntimeOptions(interleave=side),
-                context=context,
-            )
-            for name, (parameters, side) in drawn.items()
-        }
+        runtime = Runtime(scene, context=context)
         for turn in range(COST_TURNS):
             progress("cost", turn / COST_TURNS)
-            for name, runtime in runtimes.items():
-                passes = runtime.pass_milliseconds(view, 1)
+            for name, config in configs.items():
+                passes = runtime.pass_milliseconds(view, config, 1)
                 best[name] = min(best[name], sum(passes.get(each, 0.0) for each in COST_PASSES))
     against = f"default at {DEFAULT_COUNT} VPLs, {COST_SIZE[0]}x{COST_SIZE[1]}"
     default = best.pop("default")
@@ -221,34 +228,35 @@ def cost_rows(path: Path, progress: Progress) -> list[Row]:
 
 
 def relaxation_rows(names: Sequence[str], present: Mapping[str, Path], progress: Progress) -> list[Row]:
-    """Unfitted cells after more and fewer steps, in the geometric mean over scenes."""
-    logs: dict[int, list[float]] = {steps: [] for steps in (LLOYD_ITERATIONS, *LLOYD_ITERATIONS_TRIED)}
+    """relMSE after fewer and more Lloyd iterations, with unfitted discs: geometric means over scenes."""
+    discs = with_discs(ArtistParameters(vpl_count=FITTED_COUNT))
+    logs: dict[int, list[float]] = {count: [] for count in (LLOYD_ITERATIONS, *LLOYD_ITERATIONS_TRIED)}
     for name in names:
-        progress(f"{name}: relaxation", 0.0)
+        progress(f"{name}: Lloyd iterations", 0.0)
         prepared = _prepared(present[name])
-        for steps, found in logs.items():
-            cells = replace(with_discs(ArtistParameters(vpl_count=FITTED_COUNT)), lloyd_iterations=steps)
-            found.append(np.log(_error(prepared.runtime, prepared.views, cells)))
-    error = {steps: float(np.exp(np.mean(found))) for steps, found in logs.items()}
-    against = f"after {LLOYD_ITERATIONS} steps, {FITTED_COUNT} cells"
+        for count, found in logs.items():
+            config = TunedConfig(replace(discs, lloyd_iterations=count))
+            found.append(np.log(_error(prepared.runtime, prepared.views, config)))
+    error = {count: float(np.exp(np.mean(found))) for count, found in logs.items()}
+    against = f"{LLOYD_ITERATIONS} Lloyd iterations, {FITTED_COUNT} discs"
     return [
-        Row(f"relaxation_{steps}", error[steps], "relMSE", against, error[LLOYD_ITERATIONS])
-        for steps in LLOYD_ITERATIONS_TRIED
+        Row(f"relaxation_{count}", error[count], "relMSE", against, error[LLOYD_ITERATIONS])
+        for count in LLOYD_ITERATIONS_TRIED
     ]
 
 
 def count_for_error(curve: Curve, error: float) -> float:
-    """How many VPLs the curve needs for that error; its last count where it does not get there."""
-    counts, errors = np.log(list(curve)), np.log(np.maximum(list(curve.values()), 1e-9))
-    # Counts that noise has made worse than fewer are passed over: the curve falls all the way.
+    """The VPL count at which the curve has that error, or its last count if it never does."""
+    counts, errors = np.log(list(curve)), np.log(np.maximum(list(curve.values()), LEAST_ERROR))
+    # Skips counts whose error is above that of a smaller count, which is noise: the rest falls all the way.
     first = errors < np.minimum.accumulate(np.concatenate([[np.inf], errors[:-1]]))
-    return float(np.exp(np.interp(-np.log(max(error, 1e-9)), -errors[first], counts[first])))
+    return float(np.exp(np.interp(-np.log(max(error, LEAST_ERROR)), -errors[first], counts[first])))
 
 
 def slope_row(name: str, path: Path, progress: Progress) -> Row:
-    """How often a step along η tells the way that the smooth trend of the same losses goes.
+    """The share of steps along η whose loss changes in the direction of a smooth trend through all losses.
 
-    A gradient is of use where it does nearly always; a coin would do so half of the time.
+    Gradient descent over η needs a share close to 1. A coin has 0.5.
     """
     prepared = _prepared(path)
     runtime, views = prepared.runtime, prepared.views
@@ -257,18 +265,17 @@ def slope_row(name: str, path: Path, progress: Progress) -> Row:
     losses = []
     for index, importance in enumerate(places):
         progress(f"{name}: slopes", index / len(places))
-        candidate = ArtistParameters(vpl_count=FITTED_COUNT, density_importance=float(importance))
-        losses.append(
-            _fit(rotated_views(runtime, fitted_views, candidate, rotations), candidate).descent.loss
-        )
+        start = ArtistParameters(vpl_count=FITTED_COUNT, density_importance=float(importance))
+        rotated = rotated_views(runtime, fitted_views, TunedConfig(start), rotations)
+        losses.append(_fit(rotated, start).descent.loss)
     trend = np.polynomial.Polynomial.fit(places, losses, 2)
     agree = np.mean(np.sign(np.diff(losses)) == np.sign(np.diff(trend(places))))
     return Row("density_slope_agreement", float(agree), "share of steps", "a coin", 0.5)
 
 
 def write_curves(folder: Path, curves: Sequence[SceneCurves]) -> None:
-    """curves.json, and curves.png with a panel for each scene."""
-    # Here: matplotlib takes half a second to load.
+    """Write curves.json, and curves.png with a panel for each scene, into `folder`."""
+    # Imported here because matplotlib takes half a second to load.
     from matplotlib.figure import Figure
 
     document = {
@@ -296,20 +303,18 @@ def write_curves(folder: Path, curves: Sequence[SceneCurves]) -> None:
 
 
 def _prepared(path: Path) -> PreparedScene:
-    config = TunedConfig(ArtistParameters(vpl_count=FITTED_COUNT), visibility="maps")
+    config = TunedConfig(ArtistParameters(vpl_count=FITTED_COUNT))
     return prepare_scene(path, SceneOptions(size=SIZE), config, Stopwatch(), lambda stage, share: None)
 
 
-def _error(runtime: Runtime, views: Sequence[CapturedView], parameters: ArtistParameters) -> float:
+def _interleaved(parameters: ArtistParameters, side: int) -> TunedConfig:
+    return TunedConfig(parameters, quality=Quality(interleave=side))
+
+
+def _error(runtime: Runtime, views: Sequence[CapturedView], config: TunedConfig) -> float:
+    """relMSE, the mean over all views and held-out rotations."""
     rotations = table_rotations(ROTATIONS, 0, held_out=True)
-    return float(rotation_errors(runtime, views, parameters, rotations).mean())
-
-
-def _interleaved_error(prepared: PreparedScene, parameters: ArtistParameters, side: int) -> float:
-    runtime = prepared.runtime
-    config, options = TunedConfig(parameters, visibility=runtime.visibility), RuntimeOptions(interleave=side)
-    interleaved = Runtime(prepared.scene, config, options, context=runtime.context)
-    return _error(interleaved, prepared.views, parameters)
+    return float(rotation_errors(runtime, views, config, rotations).mean())
 
 
 def _main(names: Sequence[str]) -> None:
@@ -323,7 +328,7 @@ def _main(names: Sequence[str]) -> None:
 
 
 def _fit(views: Sequence[CapturedView], start: ArtistParameters) -> PlacementFit:
-    """The least relMSE: one measure for all densities and counts."""
+    """Fit falloff and maps to relMSE, which is the same measure for all densities and counts."""
     return fit_placement(views, start)
 
 

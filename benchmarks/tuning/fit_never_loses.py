@@ -1,9 +1,9 @@
-"""Whether a fit is ever worse than its start, on views and lights that chose nothing.
+"""Whether a fit is ever worse than its start, on views and lights that no choice was made on.
 
-Every scene that can be loaded, ours, and `GENERATED` of the generator's from a seed that nothing was chosen
-on, each fitted as `vpltune fit SCENE` does and once more with `FEW` VPLs. Measured on `HELD_OUT` views each.
-Results are kept in out/fit_never_loses as they come, under a digest of the program: interrupted, the same
-command goes on.
+The scenes are all shipped and third-party ones, and `GENERATED` scenes of the generator, from a seed that no
+choice was made on. Each is fitted as `vpltune fit SCENE` does, once more with `FEW` VPLs, and measured on
+`HELD_OUT` held-out views. Results are written to out/fit_never_loses as they come, in a folder named by a
+digest of the program: an interrupted run continues with the same command.
 
 `python -m benchmarks.tuning.fit_never_loses` prints the table by scene.
 """
@@ -25,54 +25,60 @@ from vpltune.renderer.files.strict_json import strict_json
 from vpltune.tuner.evaluation.guard import UNSEEN
 
 SEED = 20261129
-"""Seed of the generator. Nothing was chosen on its scenes; they are made for this measurement alone."""
+"""Seed of the generated scenes, which are made for this measurement alone."""
 GENERATED = 32
+"""Generated scenes. A choice."""
 HELD_OUT = 4
-"""Held-out views. With two, as a fit has by default, a scene's ratio depends mostly on which views they
+"""Held-out views. With two, as a fit has by default, a scene's ratio depends mostly on which views these
 are."""
 FEW = 32
-"""VPLs of the second fit."""
+"""VPLs of the second fit. A choice."""
 FIGURES = ("relmse", "trimmed_relmse", "flip", "median_error")
 CLOSE, FAR = 1.02, 1.10
-"""Ratios tuned ÷ start: what counts as no loss, and what no scene may exceed."""
+"""Ratios tuned ÷ start: up to the first a fit is not worse, and no scene may exceed the second. A choice."""
 LEAST_SHARE, MOST_KEPT = 0.95, 0.5
+"""The least share of ratios up to `CLOSE`, and the largest share of fits that keep the start. A choice."""
 MEDIAN_LIMITS = {"default": 0.90, "few": 0.5}
-"""Limits of the trimmed relMSE's median ratio."""
+"""Limits of the median ratio of trimmed relMSE, by mode. A choice."""
 WORKERS = 2
+"""Fits that run at once, in a process each. A choice."""
 SOURCES = ("renderer", "tuner", "shaders", "configs")
+"""Folders whose files the digest of the program covers."""
+DIGEST_LENGTH = 16
+"""Hexadecimal digits of that digest. A choice."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One fit: a scene file, or the number of a generated scene; with how many VPLs."""
+    """One fit of the benchmark."""
 
     name: str
     scene: str | int
+    """A scene's file, or the number of a generated scene."""
     mode: str
-    """`default` or `few`."""
+    """`default` for the default VPL count, or `few`."""
 
     @property
     def file(self) -> str:
-        """Where its result is kept."""
+        """The name of the file with its result."""
         return f"{self.name}.{self.mode}.json"
 
 
 def cells() -> list[Cell]:
-    """All fits, in the order in which they are made."""
+    """All fits in the order in which they run."""
     scenes: dict[str, str | int] = {name: str(path) for name, path in present_scenes().items()}
     scenes |= {f"generated-{number:02d}": number for number in range(GENERATED)}
     return [Cell(name, scene, mode) for mode in ("default", "few") for name, scene in scenes.items()]
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """For each mode: the worst ratios, the medians, the share of ratios within 2 %, and of fits that kept
-    the start."""
+    """For each mode, the worst and median ratios, and the shares of ratios up to 1.02 and of kept starts."""
     results = list(measured(progress))
     return [row for mode in ("default", "few") for row in mode_rows(mode, results)]
 
 
 def mode_rows(mode: str, results: list[dict[str, Any]]) -> list[Row]:
-    """The rows of one mode, from what `measured` gives."""
+    """The rows of one mode, from the results of `measured`."""
     lit = [result for result in results if result["mode"] == mode and result["ratios"]]
     ratios = {figure: [result["ratios"][figure] for result in lit] for figure in FIGURES}
     every = [ratio for values in ratios.values() for ratio in values]
@@ -96,8 +102,7 @@ def mode_rows(mode: str, results: list[dict[str, Any]]) -> list[Row]:
 
 
 def measured(progress: Callable[[str, float], None]) -> Iterator[dict[str, Any]]:
-    """Every fit's status, and its ratios where there is indirect light; from the folder of results, or
-    made."""
+    """The results of all fits (`result_of`), in the order of `cells`; runs the fits that have none yet."""
     folder = REPOSITORY / "out" / "fit_never_loses" / program_digest()
     wanted = cells()
     left = [cell for cell in wanted if not (folder / cell.file).exists()]
@@ -109,16 +114,17 @@ def measured(progress: Callable[[str, float], None]) -> Iterator[dict[str, Any]]
 
 
 def program_digest() -> str:
-    """A digest of all that a fit runs, and of how it is measured here."""
+    """A digest of the code and data of a fit, and of this file."""
     digest = hashlib.sha256(Path(__file__).read_bytes())
     for source in SOURCES:
         for path in sorted((REPOSITORY / source).rglob("*")):
             if path.suffix in (".py", ".json", ".glsl", ".comp", ".frag", ".vert"):
                 digest.update(str(path.relative_to(REPOSITORY)).encode() + path.read_bytes())
-    return digest.hexdigest()[:16]
+    return digest.hexdigest()[:DIGEST_LENGTH]
 
 
 def _measure(work: tuple[Cell, Path]) -> str:
+    # Imported here, in the process that fits.
     from vpltune.renderer.config.artist_parameters import ArtistParameters
     from vpltune.renderer.config.tuned_config import TunedConfig
     from vpltune.renderer.export.glb_writer import write_glb
@@ -139,7 +145,7 @@ def _measure(work: tuple[Cell, Path]) -> str:
 
 
 def result_of(cell: Cell, document: dict[str, Any]) -> dict[str, Any]:
-    """What is kept of a fit; its ratios are empty where no light reaches the held-out views."""
+    """The part of metrics.json that is kept; `ratios` is empty where no light reaches the held-out views."""
     held_out = document["metrics"]["held_out"]
     default, tuned = held_out["default"], held_out["tuned"]
     lit = default["relmse"] is not None and default["relmse"] == default["relmse"]
@@ -159,7 +165,7 @@ def result_of(cell: Cell, document: dict[str, Any]) -> dict[str, Any]:
 
 
 def table(results: list[dict[str, Any]]) -> str:
-    """One line a fit: status and ratios."""
+    """A Markdown table with the status and the ratios of each fit."""
     lines = [
         "| scene | VPLs | status | " + " | ".join(FIGURES) + " |",
         "|---|---|---|" + "---|" * len(FIGURES),

@@ -1,23 +1,24 @@
-"""How long a fit takes to come within 1 % of the best loss that anyone finds, against searches of today.
+"""How long a fit and other searches take until they are within 1 % of the best loss that any of them finds.
 
-All continuous parameters are free: k, α, κ, β, σ, γ and η, of few VPLs with visibility maps and cells.
-Everyone minimises relMSE, the searches by drawing every view with the real runtime at ROTATIONS rotations of
-the point table, reading it back and comparing it. Ours is `tuner.fitting.fit_density` on the same views and
-rotations, told to minimise relMSE as well and not its own robust error.
+**The problem.** All seven continuous parameters are free: k, α, κ, β, σ, γ and η. The VPLs are few, clustered
+disc lights with visibility maps. The loss is relMSE, the mean over views and `ROTATIONS` rotations of the
+point table. A search evaluates it by drawing every view with the runtime, reading the images back, and
+comparing them. Our fit is `tuner.fitting.fit_density` on the same views and rotations. It minimises relMSE
+here too, and not its robust error.
 
-The surrogate does not know where VPLs will stand, so it takes the runtime's place for the first five of the
-seven: a search with `_surrogate` has the placements that ours tried, in that order, each captured anew, and
-looks for the five at each. What it finds is judged by the runtime. It tells what least squares are worth; the
-rest is the surrogate's.
+**Searches on the surrogate.** The surrogate cannot place VPLs, so it serves for the first five parameters
+only. A search with the suffix `_surrogate` takes the placements that our fit tried, in the same order, and
+searches the five at each placement. The runtime evaluates the points that it finds. The difference to our fit
+is what least squares are worth; the rest of the gain is the surrogate's.
 
-Few rotations reward luck: a search that tries many placements ends at one that happens to suit the point
-table. So everything that a search kept on its way is judged once more, by its relMSE at rotations that nobody
-was given: the rows `…_held_out` say when what it kept came within 1 % of the least of these that anyone ended
-with, and `held_out_relmse_…` where it ended.
+**Held-out rotations.** With few rotations, a search that tries many placements ends at one that happens to
+suit the point table. Every point that a search kept is therefore also evaluated at rotations that no search
+was given. The rows `…_held_out` tell when a search's points came within 1 % of the least loss at these
+rotations, and `held_out_relmse_…` tells the loss at its end.
 
-Seconds are of tuning alone: scene, references, shaders and compiled functions are there before, for all. A
-search may take SECONDS_OVER_OURS times as long as ours, so one that never arrives has about that as the
-bound of its ratio. out/tuning/<scene>.json has what each search found and when; `python
+**Time.** Seconds count the search alone: scene, references, shaders and compiled functions exist before it
+starts. A search may take `SECONDS_OVER_OURS` times as long as our fit, so the ratio of one that never arrives
+is bounded by about that. out/tuning/<scene>.json holds what each search found and when, and `python
 scripts/tuning_table.py` prints it as a table.
 """
 
@@ -49,6 +50,7 @@ from benchmarks.tuning.tuning_objectives import (
 )
 from benchmarks.tuning.tuning_searches import SEARCHES
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.renderer.files.strict_json import strict_json
@@ -64,21 +66,28 @@ from vpltune.tuner.fitting.fit_density import (
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
 SIZE = (64, 48)
+"""Width and height of a view in pixels: those of a fit."""
 VPLS = 32
+"""VPLs of every image. A choice."""
 VIEWS = 2
+"""Fitted views. A choice."""
 HELD_OUT_ROTATIONS = 8
+"""Rotations of the point table that no search is given. A choice."""
 ROTATIONS = 4
-"""Of the point table, for every view, the same for everyone: eight frames for a loss."""
+"""Rotations of the point table that all searches are given: eight frames for a loss. A choice."""
 RSM_RESOLUTION = 256
-"""Everyone's. A finer one makes frames dearer, and with them the searches: the bound would be higher."""
+"""Texels along the side of an RSM face. A choice: a finer RSM makes every frame slower, and all searches
+with it."""
 SECONDS_OVER_OURS = 32.0
-"""Seconds that a search may take, over ours."""
+"""Most seconds of a search over those of our fit. A choice."""
 MOST_SECONDS = 120.0
-"""And no more than these: where frames take long, the bound is lower."""
+"""Most seconds of a search, which lower the bound where frames take long. A choice."""
 SURROGATE_CAP = 60
-"""Evaluations of a search over the surrogate, at each placement."""
+"""Evaluations of a search on the surrogate, at each placement. A choice."""
 OWN_RUNS = 3
+"""Timed runs of our fit, of which the median counts. A choice."""
 WITHIN = 0.01
+"""Relative distance to the best loss at which a search has arrived. A choice."""
 SCENES = (
     "babylon-marble-tower",
     "bevy-cornellbox",
@@ -96,10 +105,11 @@ SCENES = (
     "playcanvas-house",
 )
 FOLDER = REPOSITORY / "out" / "tuning"
+"""The folder with a JSON file for each measured scene."""
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """For every search, over the runtime and over the surrogate, its seconds over ours."""
+    """For every search, on the runtime and on the surrogate, its seconds, frames and losses against ours."""
     present = {name: path for name, path in present_scenes().items() if name in SCENES}
     measured = []
     for index, (name, path) in enumerate(present.items()):
@@ -110,7 +120,7 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 
 
 def measure_scene(name: str, path: Path) -> dict[str, Any]:
-    """Every search on one scene; written to out/tuning/<name>.json and returned."""
+    """Run our fit and every search on one scene; writes out/tuning/<name>.json, and returns its content."""
     problem = _problem(path)
     ours, placements = _ours(problem)
     traces = {"ours": ours}
@@ -119,7 +129,7 @@ def measure_scene(name: str, path: Path) -> dict[str, Any]:
         traces[search] = _searched(problem, run, seconds)
         traces[f"{search}_surrogate"] = _searched_on_surrogate(problem, run, placements, seconds)
     unseen = table_rotations(HELD_OUT_ROTATIONS, 0, held_out=True)
-    held_out = RuntimeLoss(problem.runtime, problem.views, unseen, problem.base)
+    held_out = RuntimeLoss(problem.runtime, problem.views, unseen, problem.config)
     losses = {
         "default": problem.loss(problem.start),
         "bgfx_formula": problem.loss.of_images(_formula(problem, bgfx_irradiance)),
@@ -141,40 +151,53 @@ def measure_scene(name: str, path: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
+    """What all searches are given for one scene."""
+
     runtime: CountingRuntime
     views: tuple[CapturedView, ...]
     rotations: tuple[Rotation, ...]
-    base: ArtistParameters
-    """Where everyone begins: the defaults, but few VPLs with cells."""
+    config: TunedConfig
+    """The start of every search: the defaults with few VPLs, which are clustered disc lights."""
     loss: RuntimeLoss
 
     @property
+    def base(self) -> ArtistParameters:
+        """The parameters that every search starts with."""
+        return self.config.parameters
+
+    @property
     def start(self) -> Point:
+        """The start as a point of the unit cube."""
         return SPACE.point(self.base)
 
     def captured(self, parameters: ArtistParameters) -> tuple[CapturedView, ...]:
-        return rotated_views(self.runtime, self.views, parameters, self.rotations)
+        """The views drawn with `parameters` at every rotation."""
+        config = self.config.with_parameters(parameters)
+        return rotated_views(self.runtime, self.views, config, self.rotations)
 
 
 def _problem(path: Path) -> _Problem:
     base = with_discs(ArtistParameters(vpl_count=VPLS))
-    config = TunedConfig(base, visibility="maps")
+    config = TunedConfig(base, quality=Quality(rsm_resolution=RSM_RESOLUTION))
     options = SceneOptions(size=SIZE, views=VIEWS)
     prepared = prepare_scene(path, options, config, Stopwatch(), lambda stage, share: None)
-    runtime = CountingRuntime(prepared.scene, config, rsm_resolution=RSM_RESOLUTION)
+    runtime = CountingRuntime(prepared.scene, context=prepared.runtime.context)
     views = tuple(view for view in prepared.views if view.view.split == "fitted")
     rotations = table_rotations(ROTATIONS, 0)
-    return _Problem(runtime, views, rotations, base, RuntimeLoss(runtime, views, rotations, base))
+    return _Problem(runtime, views, rotations, config, RuntimeLoss(runtime, views, rotations, config))
 
 
 def _ours(problem: _Problem) -> tuple[Trace, list[ArtistParameters]]:
-    """The fit, the median of some runs after one that compiles; and the placements that it tried."""
+    """Run our fit, and return its trace and the placements that it tried.
+
+    Its seconds are the median of some runs, after one that compiles.
+    """
     seconds = []
     for _ in range(1 + OWN_RUNS):
         problem.runtime.frames = 0
         started = time.perf_counter()
         fit = fit_density(
-            problem.runtime, problem.views, problem.base, rotations=problem.rotations, robust=False
+            problem.runtime, problem.views, problem.config, rotations=problem.rotations, robust=False
         )
         seconds.append(time.perf_counter() - started)
     trace, point, frames = Trace(), SPACE.point(fit.parameters), problem.runtime.frames
@@ -191,6 +214,8 @@ def _ours(problem: _Problem) -> tuple[Trace, list[ArtistParameters]]:
 
 
 def _searched(problem: _Problem, run: Callable, seconds: float) -> Trace:
+    """Run a search on the runtime for at most `seconds`."""
+    # Compiles the shaders.
     problem.loss(problem.start)
     problem.runtime.frames = 0
     trace = Trace()
@@ -205,7 +230,9 @@ def _searched(problem: _Problem, run: Callable, seconds: float) -> Trace:
 def _searched_on_surrogate(
     problem: _Problem, run: Callable, placements: Sequence[ArtistParameters], seconds: float
 ) -> Trace:
+    """Run a search on the surrogate at each placement, for at most `seconds` in all."""
     start = SURROGATE_SPACE.point(problem.base)
+    # Compiles the loss.
     SurrogateLoss(problem.captured(problem.base), problem.base)(start)
     problem.runtime.frames = 0
     trace, started = Trace(), time.perf_counter()
@@ -219,6 +246,7 @@ def _searched_on_surrogate(
             run(objective, start)
         where = SPACE.point(placement)[len(start) :]
         trace.points[found:] = [np.concatenate([point, where]) for point in trace.points[found:]]
+    # The runtime judges the points that were found.
     judged = Trace()
     for point, elapsed, frames in zip(trace.points, trace.seconds, trace.frames, strict=True):
         judged.add(point, problem.loss(point), elapsed, frames)
@@ -230,6 +258,8 @@ def _searched_on_surrogate(
 def _formula(
     problem: _Problem, irradiance: Callable[[CapturedFrame], np.ndarray]
 ) -> Callable[[CapturedView, Rotation], np.ndarray]:
+    """A function that draws with one of `open_formulas`; it must be called for views and rotations in
+    order."""
     captured = iter(problem.captured(problem.base))
 
     def image(view: CapturedView, rotation: Rotation) -> np.ndarray:
@@ -242,6 +272,7 @@ def _formula(
 
 
 def _told(trace: Trace, held_out: RuntimeLoss) -> dict[str, Any]:
+    """The part of the JSON file about one search."""
     return {
         "evaluations": trace.evaluations,
         "spent_seconds": trace.spent_seconds,
@@ -255,25 +286,26 @@ def _told(trace: Trace, held_out: RuntimeLoss) -> dict[str, Any]:
 
 
 Judge = Literal["losses", "held_out"]
-"""What a search minimised, or the same at rotations that it was not given."""
+"""The rotations of a loss: those that searches were given, or the held-out ones."""
 
 
 def best_found(scene: dict[str, Any], judge: Judge = "losses") -> float:
-    """The least that anyone has ended with, by the runtime."""
+    """The least loss that any search ended with, by the runtime."""
     return min(search[judge][-1] for search in scene["searches"].values())
 
 
 @dataclass(frozen=True)
 class Spent:
-    """Until a loss was reached; all that a search was given, where `there` is False."""
+    """The seconds and frames of a search until it reached a loss."""
 
     seconds: float
     frames: int
-    there: bool
+    arrived: bool
+    """Whether it did; else the figures are all that it spent."""
 
 
 def spent_to(search: dict[str, Any], aim: float, judge: Judge = "losses") -> Spent:
-    """What a search spent until what it kept was at most `aim`."""
+    """What a search spent until the loss of a point that it kept was at most `aim`."""
     for seconds, frames, value in zip(search["seconds"], search["frames"], search[judge], strict=True):
         if value <= aim:
             return Spent(seconds, frames, True)
@@ -282,19 +314,19 @@ def spent_to(search: dict[str, Any], aim: float, judge: Judge = "losses") -> Spe
 
 
 def spent_in(scene: dict[str, Any], judge: Judge = "losses") -> dict[str, Spent]:
-    """By search: what it spent to come within 1 % of the best."""
+    """What each search spent to come within 1 % of the best loss, by its name."""
     best = best_found(scene, judge)
     aim = best + WITHIN * abs(best)
     return {name: spent_to(search, aim, judge) for name, search in scene["searches"].items()}
 
 
 def rows_of(measured: list[dict[str, Any]]) -> list[Row]:
-    """The rows of `vpltune bench tuning` from what was measured scene by scene."""
+    """The rows of the benchmark, from the contents of the JSON files of all scenes."""
     result = []
     for judge, suffix in (("losses", ""), ("held_out", "_held_out")):
         spent = [spent_in(scene, judge) for scene in measured]
         soonest = [
-            min((scene[name] for name in SEARCHES), key=lambda found: (not found.there, found.seconds))
+            min((scene[name] for name in SEARCHES), key=lambda found: (not found.arrived, found.seconds))
             for scene in spent
         ]
         ours = [scene["ours"] for scene in spent]
@@ -305,11 +337,11 @@ def rows_of(measured: list[dict[str, Any]]) -> list[Row]:
             result.append(_spent_row(f"{name}{suffix}", theirs, ours, "seconds", "s"))
     for name in ("default", "bgfx_formula", "babylon_formula"):
         over = median(scene["losses"][name] / best_found(scene) for scene in measured)
-        result.append(Row(f"loss_{name}", over, "1", "best loss found by anyone", 1.0))
+        result.append(Row(f"loss_{name}", over, "1", "best loss of any search", 1.0))
     for name in ("ours", *SEARCHES):
         over = median(scene["searches"][name]["losses"][-1] / best_found(scene) for scene in measured)
-        result.append(Row(f"loss_{name}", over, "1", "best loss found by anyone", 1.0))
-    unseen = "ours, at rotations that nobody was given"
+        result.append(Row(f"loss_{name}", over, "1", "best loss of any search", 1.0))
+    unseen = "ours, at held-out rotations"
     for name in SEARCHES:
         over = median(scene["searches"][name]["held_out"][-1] / _own_held_out(scene) for scene in measured)
         result.append(Row(f"held_out_relmse_{name}", over, "1", unseen, 1.0))
@@ -319,17 +351,21 @@ def rows_of(measured: list[dict[str, Any]]) -> list[Row]:
 
 
 def _own_held_out(scene: dict[str, Any]) -> float:
+    """The loss of our fit at held-out rotations."""
     return scene["searches"]["ours"]["held_out"][-1]
 
 
 def _spent_row(name: str, theirs: list[Spent], ours: list[Spent], quantity: str, unit: str) -> Row:
+    """A search's seconds or frames to come within 1 % of the best, against ours.
+
+    The row's ratio is the median over scenes of the ratio: its value is that median times our own median.
+    """
     own = median(getattr(mine, quantity) for mine in ours)
     ratio = median(getattr(t, quantity) / getattr(o, quantity) for t, o in zip(theirs, ours, strict=True))
-    against = f"ours ({sum(mine.there for mine in ours)} of {len(ours)} within 1 %)"
-    missed = sum(not their.there for their in theirs)
+    against = f"ours ({sum(mine.arrived for mine in ours)} of {len(ours)} within 1 %)"
+    missed = sum(not their.arrived for their in theirs)
     if missed:
         against += f"; ≥: {missed} of {len(theirs)} never got there"
-    # Its median ratio, in our own median, so that the row's ratio is the median over scenes.
     return Row(name, ratio * own, unit, against, own)
 
 

@@ -1,17 +1,21 @@
-"""What a search asks: the loss at a point of the unit cube, by the runtime's frames or by the surrogate."""
+"""Objectives that searches minimise: the loss at a point of the unit cube, from the runtime or the surrogate.
+
+A search evaluates a `CappedObjective`, which records its progress in a `Trace` and ends it at a limit.
+"""
 
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import CapturedFrame, read_image
-from vpltune.renderer.frame.frame import Frame
-from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.frame.runtime import DrawnFrame, Runtime
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.fitting.fit_density import Rotation, view_rotations
 from vpltune.tuner.fitting.search_space import FALLOFF_SPECS, VISIBILITY_SPECS, SearchSpace
@@ -28,31 +32,36 @@ from vpltune.tuner.surrogate.vpl_visibility import (
 from vpltune.tuner.surrogate.wide_vectors import wide_jit
 
 Point = np.ndarray
+"""A point of the unit cube, with a coordinate for each parameter of a `SearchSpace`."""
 
 PLACED_SPECS = (parameter_spec("density_exponent"), parameter_spec("density_importance"))
+"""Parameters that move the VPLs."""
 SURROGATE_SPACE = SearchSpace((*FALLOFF_SPECS, *VISIBILITY_SPECS))
-"""What the surrogate knows of: where VPLs stand is for the runtime to say."""
+"""The parameters that the surrogate knows: it takes the VPLs where the runtime has placed them."""
 SPACE = SearchSpace((*SURROGATE_SPACE.specs, *PLACED_SPECS))
-"""All continuous parameters that are fitted."""
+"""All continuous parameters that a fit of few VPLs adjusts."""
 
 
 class SearchIsOver(Exception):  # noqa: N818 - nothing has gone wrong
-    """The cap is reached: raised by an objective, caught by whoever started the search."""
+    """An objective's limit is reached: it raises this, and the code that started the search catches it."""
 
 
 @dataclass
 class Trace:
-    """Every better point that a search met, and what it had spent by then."""
+    """The points at which a search improved its loss, with the time and frames it had spent by then."""
 
     seconds: list[float] = field(default_factory=list)
     frames: list[int] = field(default_factory=list)
     losses: list[float] = field(default_factory=list)
     points: list[Point] = field(default_factory=list)
     evaluations: int = 0
+    """Evaluations so far, of all points."""
     spent_seconds: float = 0.0
+    """Seconds so far, also since the last improvement."""
     spent_frames: int = 0
 
     def add(self, point: Point, loss: float, seconds: float, frames: int) -> None:
+        """Count an evaluation, and keep its point if its loss is the least so far."""
         self.evaluations += 1
         self.spent_seconds, self.spent_frames = seconds, frames
         if not self.losses or loss < self.losses[-1]:
@@ -63,44 +72,58 @@ class Trace:
 
 
 class CountingRuntime(Runtime):
-    """A runtime that knows how many frames it has drawn."""
+    """A runtime that counts the frames it draws."""
 
     frames = 0
 
-    def _draw(self, *arguments: object, **keywords: object) -> Frame:
+    def _draw(self, *arguments: Any, **keywords: Any) -> DrawnFrame:
         self.frames += 1
         return super()._draw(*arguments, **keywords)
 
-    def captures(self, view: View, table_rotations: Sequence[Rotation]) -> list[CapturedFrame]:
-        # Though the others are drawn in part only.
+    def captures(
+        self, view: View, config: TunedConfig, table_rotations: Sequence[Rotation]
+    ) -> list[CapturedFrame]:
+        """As `Runtime.captures`; every rotation counts as a frame, although most are drawn in part."""
         self.frames += len(table_rotations) - 1
-        return super().captures(view, table_rotations)
+        return super().captures(view, config, table_rotations)
+
+    def indirect_irradiance(self, view: View, config: TunedConfig, rotation: Rotation) -> np.ndarray:
+        """Indirect irradiance [W/m²] of a view, [height, width, 3]; nothing else is read back or resolved."""
+        self.context.__enter__()
+        drawn = self._draw(view, config, None, table_rotation=rotation)
+        return read_image(drawn.frame.resources, "indirect_irradiance")[..., :3]
 
 
 class RuntimeLoss:
-    """relMSE, free of the reference's noise, of what the runtime draws: every view drawn at every rotation of
-    the point table, read back and compared, each time."""
+    """relMSE of the runtime's images without the reference's noise, the mean over views and rotations.
+
+    Every evaluation draws each view at each rotation of the point table, reads the image back, and compares
+    it with the reference.
+    """
 
     def __init__(
         self,
-        runtime: Runtime,
+        runtime: CountingRuntime,
         views: Sequence[CapturedView],
         rotations: Sequence[Rotation],
-        base: ArtistParameters,
+        config: TunedConfig,
     ):
-        self._runtime, self._views, self._rotations, self._base = runtime, views, rotations, base
-        # As numpy arrays: what they cost to compare is not to be JAX's start of a computation.
+        """`config` holds the parameters that are not searched."""
+        self._runtime, self._views, self._rotations, self._config = runtime, views, rotations, config
+        # As numpy arrays, so that a comparison does not pay for starting a JAX computation.
         self._targets = [
             tuple(np.asarray(part) for part in (target.half_a, target.half_b, target.weight))
             for target in (_target(view) for view in views)
         ]
 
     def __call__(self, point: Point) -> float:
-        self._runtime.parameters = SPACE.parameters(point, self._base)
-        return self.of_images(self._drawn)
+        config = self._config.with_parameters(SPACE.parameters(point, self._config.parameters))
+        return self.of_images(
+            lambda view, rotation: self._runtime.indirect_irradiance(view.view, config, rotation)
+        )
 
     def of_images(self, image_of: Callable[[CapturedView, Rotation], np.ndarray]) -> float:
-        """The loss of any images, [height, width, 3] each."""
+        """The loss of other images of the views, [height, width, 3] each."""
         losses = []
         for index, (view, (half_a, half_b, weight)) in enumerate(
             zip(self._views, self._targets, strict=True)
@@ -110,14 +133,12 @@ class RuntimeLoss:
                 losses.append(float((weight * (values - half_a) * (values - half_b)).sum()))
         return float(np.mean(losses))
 
-    def _drawn(self, view: CapturedView, rotation: Rotation) -> np.ndarray:
-        return read_image(self._runtime._draw(view.view, rotation).indirect_irradiance)[..., :3]
-
 
 class SurrogateLoss:
-    """The same of the surrogate, at points of `SURROGATE_SPACE`, for VPLs as they stand in captured views."""
+    """The loss of the surrogate's images at points of `SURROGATE_SPACE`, with the VPLs of captured views."""
 
     def __init__(self, views: Sequence[CapturedView], rest: ArtistParameters):
+        """`rest` holds the falloff parameters that are not searched."""
         self._rest = FalloffParameters.of(rest)
         pairs = []
         for view in views:
@@ -149,8 +170,16 @@ def _target(view: CapturedView) -> Target:
 
 
 class CappedObjective:
-    """Counts into a trace, keeps the time, and ends a search after so many more evaluations, or seconds since
-    `started`."""
+    """An objective that records its evaluations in a trace, and raises `SearchIsOver` at a limit.
+
+    Args:
+        loss: the loss at a point.
+        trace: what evaluations are recorded in; several objectives may share it.
+        frames: gives the number of frames drawn so far.
+        evaluations: the limit of further evaluations; None sets none.
+        seconds: the limit of seconds since `started`.
+        started: a value of `time.perf_counter`; None takes the present.
+    """
 
     def __init__(
         self,

@@ -1,6 +1,6 @@
-"""The ways in which renderers are tuned today: each asks an objective for losses until it is told to stop.
+"""Searches with which renderers are tuned today. Each evaluates an objective until the objective stops it.
 
-All start from the defaults where they take a start, and know the ranges of the parameter table.
+They know the ranges of the parameters, as the unit cube. Those that take a starting point begin at `start`.
 """
 
 import warnings
@@ -13,17 +13,24 @@ from scipy.optimize import minimize
 
 Objective = Callable[[np.ndarray], float]
 SEED = 0
+"""Seed of every random search. A choice."""
 GRID_STEPS = 10
+"""Values that the grid tries for each parameter, as XeGTAO's auto-tune does."""
 GRID_PASSES = 6
-"""As XeGTAO's auto-tune: ten steps a setting, six passes, each pass over a narrower range about the best."""
+"""Passes of the grid over all parameters, as in XeGTAO's auto-tune, each over a narrower range."""
 GRID_NARROWING = 0.5
+"""Width of a pass's range over that of the pass before. A choice."""
 DIFFERENCE = 1e-3
-"""Of the cube's side: images are float32, and their loss is good to about 1e-6."""
+"""Step of finite differences in sides of the unit cube. A choice: images are float32, and their loss is good
+to about 1e-6."""
 FIRST_SIGMA = 0.2
+"""Initial step size of CMA-ES in sides of the unit cube. A choice."""
+MOST_TRIALS = 100_000
+"""Trials that Optuna is asked for: more than it has time for, so that only the objective stops it."""
 
 
 def grid_narrowing(objective: Objective, start: np.ndarray) -> None:
-    """Setting by setting, the best of ten values; then again over half the range about it."""
+    """A narrowing grid: the best of ten values for each parameter in turn; then again over half the range."""
     best, width = start.copy(), 1.0
     best_loss = objective(best)
     for _ in range(GRID_PASSES):
@@ -39,7 +46,7 @@ def grid_narrowing(objective: Objective, start: np.ndarray) -> None:
 
 
 def random_search(objective: Objective, start: np.ndarray) -> None:
-    """Points drawn evenly from the cube."""
+    """Random search: points drawn uniformly from the cube."""
     random = np.random.default_rng(SEED)
     objective(start)
     while True:
@@ -47,7 +54,7 @@ def random_search(objective: Objective, start: np.ndarray) -> None:
 
 
 def optuna_tpe(objective: Objective, start: np.ndarray) -> None:
-    """Optuna's tree-structured Parzen estimator (Bergstra et al. 2011), all parameters modelled together."""
+    """Optuna's tree-structured Parzen estimator (Bergstra et al. 2011), with a joint model of parameters."""
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
@@ -57,12 +64,12 @@ def optuna_tpe(objective: Objective, start: np.ndarray) -> None:
     study.enqueue_trial(dict(zip(names, map(float, start), strict=True)))
     study.optimize(
         lambda trial: objective(np.array([trial.suggest_float(name, 0.0, 1.0) for name in names])),
-        n_trials=100_000,
+        n_trials=MOST_TRIALS,
     )
 
 
 def cma_es(objective: Objective, start: np.ndarray) -> None:
-    """CMA-ES (Hansen and Ostermeier 2001) within the cube, begun anew when it has settled."""
+    """CMA-ES (Hansen and Ostermeier 2001) within the cube; restarts with another seed when it converges."""
     seed = SEED + 1
     while True:
         options = {"bounds": [0.0, 1.0], "seed": seed, "verbose": -9}
@@ -74,7 +81,7 @@ def cma_es(objective: Objective, start: np.ndarray) -> None:
 
 
 def finite_differences(objective: Objective, start: np.ndarray) -> None:
-    """L-BFGS-B (Byrd et al. 1995) with forward differences; from a random point when it has settled."""
+    """L-BFGS-B (Byrd et al. 1995) with forward differences; restarts at a random point when it converges."""
     random, point = np.random.default_rng(SEED), start
     while True:
         minimize(

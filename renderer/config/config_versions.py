@@ -31,7 +31,9 @@ def brought_forward(document: dict[str, Any], where: str) -> dict[str, Any]:
     forward = {**document, "version": 2}
     parameters = document.get("parameters")
     if isinstance(parameters, dict):
-        for older in OLDER_NAMES:
+        for older, newer in OLDER_NAMES.items():
+            if newer in parameters:
+                raise InputError(f"{where}: parameters: unknown key '{newer}'; version 1 calls it '{older}'")
             if older not in parameters:
                 raise InputError(f"{where}: parameters: key '{older}' is missing")
         forward["parameters"] = {OLDER_NAMES.get(key, key): value for key, value in parameters.items()}
@@ -41,7 +43,12 @@ def brought_forward(document: dict[str, Any], where: str) -> dict[str, Any]:
             forward["visibility"] = "transmittance"
             forward["parameters"]["extinction_coefficient"] = 0.0
     provenance = document.get("provenance")
-    if isinstance(provenance, dict) and "status" in provenance:
+    if isinstance(provenance, dict) and _says_how_the_fit_ended(provenance):
         forward["provenance"] = {key: v for key, v in provenance.items() if key not in ("status", "fit")}
         forward["fit"] = {"status": provenance["status"], "sentence": provenance.get("fit", "")}
     return forward
+
+
+def _says_how_the_fit_ended(provenance: dict[str, Any]) -> bool:
+    """As a fit wrote it; anybody else could call a number of their own `status`."""
+    return isinstance(provenance.get("status"), str) and isinstance(provenance.get("fit", ""), str)

@@ -3,7 +3,6 @@
 `vpltune fit --budget-ms` finds them, and every command draws with them unless a flag overrides one.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -92,13 +91,23 @@ class Quality:
         return members
 
     @classmethod
-    def validated(cls, values: Any, where: str) -> "Quality":
+    def validated(cls, values: Any, where: str, others: tuple[str, ...] = ()) -> "Quality":
         """The part from a file's content; keys that are absent have their defaults.
+
+        Args:
+            values: the object without the members that others read.
+            where: names it in errors.
+            others: names of those members, for the list of known keys.
 
         Raises:
             InputError: not an object, an unknown key, or a value out of range.
         """
-        members = _members(values, tuple(cls.__dataclass_fields__), where)
+        members = _members(values, (*cls.__dataclass_fields__, *others), where)
+        for name in ("interleave", "map_size", "map_refinement", "rsm_resolution"):
+            if name in members:
+                members[name] = _integer(members[name])
+        if "rsm_resolution" in members:
+            _whole(members["rsm_resolution"], SMALLEST_RSM, LARGEST_RSM, f"{where}.rsm_resolution")
         if "budget" in members:
             members["budget"] = _budget(members["budget"], f"{where}.budget")
         # Checked before the object exists, so that the error names the file.
@@ -168,6 +177,7 @@ def _budget(values: Any, where: str) -> MetBudget:
         raise InputError(f"{where}.milliseconds: must be positive, got {milliseconds!r}")
     if not isinstance(size, list) or len(size) != 2:
         raise InputError(f"{where}.frame_size: must be [width, height], got {size!r:.60}")
+    size = [_integer(side) for side in size]
     for side in size:
         _whole(side, 1, LARGEST_SIDE, f"{where}.frame_size")
     if not isinstance(machine, str):
@@ -184,6 +194,11 @@ def _members(values: Any, known: tuple[str, ...], where: str) -> dict[str, Any]:
     return dict(values)
 
 
+def _integer(value: Any) -> Any:
+    """A whole number that is written as a fraction, 24.0, as an int; anything else as it is."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
 def _one_of(value: Any, allowed: tuple[int, ...], where: str) -> None:
     if isinstance(value, bool) or not isinstance(value, int) or value not in allowed:
         raise InputError(f"{where}: must be one of {', '.join(map(str, allowed))}, got {value!r:.60}")
@@ -195,6 +210,7 @@ def _whole(value: Any, low: int, high: int, where: str) -> None:
 
 
 def _number(value: Any, low: float, high: float, where: str) -> None:
-    number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    # False for NaN, and no conversion to float, which overflows on 10**400.
     if not number or not low <= value <= high:
         raise InputError(f"{where}: must be a number from {low:g} to {high:g}, got {value!r:.60}")

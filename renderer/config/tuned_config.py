@@ -19,6 +19,7 @@ Version 1 is read too (`renderer.config.config_versions`).
 
 import hashlib
 import json
+import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -44,6 +45,8 @@ PRESETS = (DEFAULT_CONFIG_NAME, AUTO_CONFIG_NAME)
 # A real file is about 1 kB; the bound keeps a wrong path (a scene, a device) from being read whole.
 MAXIMUM_FILE_BYTES = 1 << 20
 LARGEST_NUMBER = sys.float_info.max
+DEEPEST_LIGHT = 32
+"""Levels of the reserved key `light`: more than any settings have, and few enough to write again."""
 KEYS = (
     "format",
     "version",
@@ -234,9 +237,9 @@ def _config(document: dict[str, Any], where: str) -> TunedConfig:
         provenance=_checked_provenance(document.get("provenance", {}), where),
         visibility=_checked_visibility(document.get("visibility", DEFAULT_VISIBILITY), where),
         auto=_checked_auto(document, parameters["lloyd_iterations"], where),
-        quality=Quality.validated(quality, f"{where}: quality"),
+        quality=Quality.validated(quality, f"{where}: quality", _QUALITY_PARAMETERS),
         fit=None if fit is None else _checked_fit(fit, where),
-        light=_object(document, "light", where),
+        light=_checked_light(_object(document, "light", where), where),
     )
 
 
@@ -314,6 +317,22 @@ def _checked_provenance(provenance: Any, where: str) -> dict[str, str | int | fl
     return provenance
 
 
+def _checked_light(light: dict[str, Any], where: str) -> dict[str, Any]:
+    """As it is, where it can be written again: finite numbers, in not too many levels."""
+    level: list[Any] = [light]
+    for _ in range(DEEPEST_LIGHT):
+        below: list[Any] = []
+        for value in level:
+            if isinstance(value, float) and not math.isfinite(value):
+                raise InputError(f"{where}: light: numbers must be finite, got {value!r}")
+            if isinstance(value, dict | list):
+                below.extend(value.values() if isinstance(value, dict) else value)
+        level = below
+    if level:
+        raise InputError(f"{where}: light: must have at most {DEEPEST_LIGHT} levels")
+    return light
+
+
 def _check_checksum(checksum: Any, config: TunedConfig, where: str) -> None:
     if checksum != _checksum(_document(config)):
         raise InputError(
@@ -323,6 +342,15 @@ def _check_checksum(checksum: Any, config: TunedConfig, where: str) -> None:
 
 
 def _checksum(document: dict[str, Any]) -> str:
-    """Taken of the values, so that a file may be formatted anew: sorted keys, no blanks."""
-    canonical = json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    """Taken of the values, so that a file may be formatted anew: sorted keys, no blanks, 15.0 as 15."""
+    canonical = json.dumps(_canonical(document), sort_keys=True, separators=(",", ":"), allow_nan=False)
     return _CHECKSUM_PREFIX + hashlib.sha256(canonical.encode("ascii")).hexdigest()
+
+
+def _canonical(value: Any) -> Any:
+    """JSON has one kind of number, and some programs write 15.0 as 15."""
+    if isinstance(value, dict):
+        return {key: _canonical(member) for key, member in value.items()}
+    if isinstance(value, list):
+        return [_canonical(member) for member in value]
+    return int(value) if isinstance(value, float) and value.is_integer() else value

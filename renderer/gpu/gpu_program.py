@@ -28,8 +28,8 @@ class _Declaration:
         self.shader = shader
         self.reads, self.writes = _by_shader_name(reads), _by_shader_name(writes)
         both = [*self.reads, *self.writes]
-        if len(set(both)) != len(both):
-            raise ValueError(f"{shader}: a name is declared more than once in {both}")
+        if len(set(both)) != len(reads) + len(writes):
+            raise ValueError(f"{shader}: a name is declared more than once in {[*reads, *writes]}")
         self.units = {name: unit for unit, name in enumerate(both)}
         self.image_units = {name: unit for unit, name in enumerate(self.writes)}
 

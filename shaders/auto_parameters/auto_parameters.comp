@@ -26,11 +26,11 @@ layout(std430, binding = AUTO_PRIOR_BINDING) readonly buffer AutoPriorWeights {
 };
 
 layout(std430, binding = AUTO_STATE_BINDING) buffer AutoState {
-    int started;
+    int started;              // 0 before the first frame
     float point[AUTO_COUNT];  // the parameters in the last frame, in the unit cube
 };
 
-// The block of common/artist_parameters.glsl, of which all members take four bytes.
+// The block of common/artist_parameters.glsl as an array: every member takes four bytes.
 layout(std430, binding = ARTIST_PARAMETERS_BINDING) buffer ArtistParameterValues {
     float parameter_values[];
 };

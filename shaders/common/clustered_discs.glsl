@@ -1,7 +1,7 @@
 // Clustered disc lights: RSM samples grouped by their nearest VPL; each group becomes one VPL that shines as a disc.
 //
 // Provides: `cluster_distance`, `ClusterSums` and what is computed from them, and `clustered_disc`. Needs PI.
-// Constants: NORMAL_REACH [L] of renderer/frame/passes/clustered_discs.py.
+// Constants: NORMAL_REACH [L] of renderer/frame/disc_samples.py.
 // Python: renderer/frame/passes/clustered_discs.py. A numpy version: `relaxed` in examples/standalone_vpls.py.
 // Source: Lloyd 1982 for the iterations; Dong et al. 2009 ("Interactive indirect illumination using clustered
 // visibility") make virtual area lights from RSMs this way.

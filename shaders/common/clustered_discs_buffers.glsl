@@ -6,5 +6,5 @@ layout(std430, binding = VPL_SAMPLES_BINDING) readonly buffer VplSamples {
 };
 
 layout(std430, binding = VPL_OWNERS_BINDING) buffer VplOwners {
-    int vpl_owners[];  // of each sample; -1 where it is dark
+    int vpl_owners[];  // for each sample, the index of its VPL; -1 for a dark sample
 };

@@ -2,7 +2,7 @@
 //
 // Provides: `dynamic_lights` and `dynamic_light_irradiance`.
 // Constants: MIN_DISTANCE [ranges] of renderer/scene/dynamic_lights.py; nearer than this a light grows no brighter.
-// Python: renderer/scene/dynamic_lights.py (layout and meaning), renderer/gpu/dynamic_light_buffer.py (upload).
+// Python: renderer/scene/dynamic_lights.py (layout and meaning), renderer/frame/light_pre_pass.py (upload).
 // Source: KHR_lights_punctual, "Range Property" and "Inner and Outer Cone Angles".
 
 struct DynamicLight {

@@ -5,7 +5,7 @@
 // Python: `PixelList` in renderer/gpu/render_targets.py, which empties it.
 
 layout(std430, binding = PIXEL_LIST_BINDING) buffer PixelList {
-    uint pixel_list_groups[3];  // of an indirect dispatch: in rows of at most MOST_WORKGROUPS; the last is 1
+    uint pixel_list_groups[3];  // indirect dispatch: x, at most MOST_WORKGROUPS; y; 1
     uint pixel_list_count;
     uint pixel_list[];          // x | y << 16
 };

@@ -31,7 +31,7 @@ layout(std430, binding = SKIN_INFLUENCES_BINDING) readonly buffer SkinInfluences
 };
 
 layout(std430, binding = JOINT_MATRICES_BINDING) readonly buffer JointMatrices {
-    mat4 joint_matrices[];  // from the mesh as it was bound to the world
+    mat4 joint_matrices[];  // from the bind pose of the mesh to the world
 };
 
 struct SceneVertex {

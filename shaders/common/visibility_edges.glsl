@@ -5,9 +5,9 @@
 // Python: renderer/frame/passes/vpl_visibility_maps.py, which empties it.
 
 layout(std430, binding = VISIBILITY_EDGES_BINDING) buffer VisibilityEdges {
-    uint visibility_edge_groups[3];  // of an indirect dispatch: the first counts, the others are 1
-    uint visibility_edge_count;      // may exceed VISIBILITY_BLOCKS, for which there is room
-    uint visibility_edges[];         // [block]: its texel, counted over all maps
+    uint visibility_edge_groups[3];  // indirect dispatch: number of workgroups, 1, 1
+    uint visibility_edge_count;      // may exceed VISIBILITY_BLOCKS, the room there is
+    uint visibility_edges[];         // [block]: index of its texel, counted over all maps
 };
 
 // Texels of a block: each replaces one texel at a silhouette.

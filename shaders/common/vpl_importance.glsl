@@ -7,7 +7,7 @@
 // weight is in web/vpl_sums.glsl.
 
 layout(std430, binding = VPL_IMPORTANCE_BINDING) buffer VplImportance {
-    float vpl_importance[];  // [faces, IMPORTANCE_CELLS, IMPORTANCE_CELLS], a factor of the weight
+    float vpl_importance[];  // [faces, IMPORTANCE_CELLS, IMPORTANCE_CELLS]: F
 };
 
 // The importance factor F of a texel, from its importance cell.

@@ -11,7 +11,7 @@
 // bits of a float, and that surface's normal on the VPL's side, in the VPL's frame, octahedral in 2 × 16 bits. If the
 // sign bit of the first word is set, a silhouette runs through the texel. Then the second word is the index of a block
 // in visibility_details [blocks, refinement, refinement], which holds entries of the same form for finer rays.
-#ifndef VISIBILITY_MAP_ENTRY  // WebGL has no storage buffers, and brings its own
+#ifndef VISIBILITY_MAP_ENTRY  // WebGL has no storage buffers: web/visibility_atlas.glsl defines its own
 layout(std430, binding = VISIBILITY_MAPS_BINDING) buffer VisibilityMaps {
     uvec2 visibility_maps[];
 };

@@ -15,7 +15,7 @@ uniform float longest;
 
 // As in common/ray_hierarchy.glsl.
 const uint RAY_COUNT_MASK = (1u << RAY_COUNT_BITS) - 1u;
-const uint RAY_DONE = 0xFFFFFFFFu;
+const uint RAY_DONE = 0xFFFFFFFFu; // neither a node nor a triangle
 
 // The texel that holds the element at `index` of a data texture.
 ivec2 data_texel(uint index) {

@@ -71,7 +71,7 @@ def test_passes_are_rows_that_add_up(monkeypatch):
 
 def test_steadier_than_without(monkeypatch):
     """A short run of the motion benchmark: the snapped sun is at least ten times as steady."""
-    import benchmarks.quality.quality.motion as motion
+    import benchmarks.quality.motion as motion
 
     for name, value in {"SIZE": (32, 24), "FRAMES": 8, "VPL_COUNT": 64, "RSM_RESOLUTION": 128}.items():
         monkeypatch.setattr(motion, name, value)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import benchmarks.speed.descent as descent
-from benchmarks.tuning.planted_problems import planted_problem
+from vpltune.tuner.fitting.planted_problem import planted_problem
 
 
 def test_steps_are_counted_from_none():

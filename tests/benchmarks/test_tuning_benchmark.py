@@ -22,6 +22,7 @@ from benchmarks.tuning.tuning_objectives import (
 )
 from benchmarks.tuning.tuning_searches import SEARCHES
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.tuner.fitting.fit_density import rotated_views
 from vpltune.tuner.surrogate.captured_view import CapturedView
@@ -89,20 +90,21 @@ def test_searches_one_after_the_other_share_a_trace_and_a_clock():
 def test_the_surrogate_stands_for_the_runtime(gl_context):
     """All seven parameters away from the defaults: to 1e-3, and the runtime's frames are counted."""
     base = ArtistParameters(vpl_count=24, lloyd_iterations=2)
-    config = TunedConfig(base, visibility="maps")
-    runtime = CountingRuntime(colored_room(), config, rsm_resolution=128, context=gl_context)
+    config = TunedConfig(base, quality=Quality(rsm_resolution=128))
+    runtime = CountingRuntime(colored_room(), context=gl_context)
     view, rotations = corner_view("spot", (24, 18)), ((0.0, 0.0), (0.3, 0.6))
-    captured = runtime.capture(view)
+    captured = runtime.capture(view, config)
     views = (CapturedView(view, own_reference(captured), captured),)
     point = np.array([0.45, 0.3, 0.05, 0.6, 0.7, 0.8, 0.4])
     assert len(SPACE.names) == len(point)
-    loss = RuntimeLoss(runtime, views, rotations, base)
+    loss = RuntimeLoss(runtime, views, rotations, config)
     runtime.frames = 0
     drawn = loss(point)
     assert runtime.frames == 2
     parameters = SPACE.parameters(point, base)
     assert parameters.lloyd_iterations == 2
-    rotated = rotated_views(runtime, views, parameters, rotations)
+    rotated = rotated_views(runtime, views, config.with_parameters(parameters), rotations)
+    assert runtime.frames == 4
     surrogate = SurrogateLoss(rotated, parameters)(point[: len(SURROGATE_SPACE.names)])
     assert surrogate == pytest.approx(drawn, rel=1e-3)
     images = iter(rotated)

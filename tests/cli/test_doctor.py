@@ -6,6 +6,7 @@ import sys
 import pytest
 
 import vpltune.tuner.doctor.machine_findings
+import vpltune.tuner.doctor.machine_probes
 from vpltune.__main__ import run
 from vpltune.tuner.doctor.machine_findings import PROBES, Finding, Probe, run_probe
 from vpltune.tuner.doctor.machine_probes import PROBE_FUNCTIONS
@@ -104,3 +105,36 @@ def test_the_whole_machine_is_examined(capfd):
     document = json.loads(capfd.readouterr().out)
     assert [finding["name"] for finding in document["findings"]] == [probe.name for probe in PROBES]
     assert sys.executable in document["findings"][0]["detail"]
+
+
+def test_without_the_tuner_its_probes_are_not_tried(capfd, monkeypatch):
+    """An installation of the runtime alone is whole: it is told what is not there, and is not at fault."""
+    monkeypatch.setattr(
+        vpltune.tuner.doctor.machine_findings, "missing_modules", lambda extra: ("jax", "mitsuba")
+    )
+    found = {probe.name: run_probe(probe) for probe in PROBES if probe.extra}
+    assert set(found) == {"jax", "llvm", "mitsuba"}
+    for finding in found.values():
+        assert (finding.state, finding.required) == ("missing", False)
+        assert finding.detail == "needs vpltune[tuner], which is not installed"
+        assert finding.mend == 'pip install "vpltune[tuner]"'
+
+
+def test_the_extras_that_are_not_installed_are_named(monkeypatch):
+    monkeypatch.setattr(
+        vpltune.tuner.doctor.machine_probes,
+        "missing_modules",
+        lambda extra: {"tuner": (), "cluster": ("submitit",), "tensorboard": ()}[extra],
+    )
+    said = vpltune.tuner.doctor.machine_probes.probe_extras()
+    assert said == {
+        "state": "ok",
+        "detail": "installed: tuner, tensorboard; not installed: cluster (no submitit)",
+    }
+
+
+def test_without_the_tuner_the_verdict_says_what_can_be_done(capfd, monkeypatch):
+    findings = (Finding("extras", "missing", "not installed: tuner", mend="install it", required=False),)
+    monkeypatch.setattr(vpltune.tuner.doctor.machine_findings, "examine_machine", lambda: findings)
+    assert run(["doctor"]) == 0
+    assert "This machine can render, export and import; fits need vpltune[tuner]." in capfd.readouterr().out

@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
+from corner import corner
 
-from benchmarks.speed.fit import corner
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime

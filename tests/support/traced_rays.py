@@ -4,17 +4,21 @@ from collections.abc import Callable
 
 import moderngl
 import numpy as np
+import pytest
 
-from vpltune.renderer.gpu.ray_hierarchy import RAY_DEFINES, RayHierarchy
+from vpltune.renderer.gpu import shader_library
+from vpltune.renderer.gpu.gpu_program import ComputeProgram
+from vpltune.renderer.gpu.ray_hierarchy import RAY_DEFINES, RAY_READS, RayHierarchy
+from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
-from vpltune.renderer.gpu.shader_library import ShaderSource
 from vpltune.renderer.scene.scene import Scene, transform_points
 
-_MAIN = """
+_SHADER = """
 layout(local_size_x = 64) in;
+#include "common/ray_hierarchy.glsl"
 struct Ray { vec3 origin; float longest; vec3 direction; float padding; };
-layout(std430, binding = 0) readonly buffer Rays { Ray rays[]; };
-layout(std430, binding = 1) writeonly buffer Distances { vec2 distances[]; };
+layout(std430, binding = RAYS_BINDING) readonly buffer Rays { Ray rays[]; };
+layout(std430, binding = DISTANCES_BINDING) writeonly buffer Distances { vec2 distances[]; };
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i < rays.length()) {
@@ -30,21 +34,24 @@ Trace = Callable[..., tuple[np.ndarray, np.ndarray]]
 
 def ray_tracer(context: moderngl.Context) -> Trace:
     """(hierarchy, origins, directions, longest) → distances, and whether anything was met; on the GPU."""
-    source = ShaderSource("common/ray_hierarchy.glsl", RAY_DEFINES)
-    program = context.compute_shader(source.text + _MAIN)
+    resources = Resources(context)
+    shipped = shader_library.read_shader
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            shader_library, "read_shader", lambda name: _SHADER if name == "trace.comp" else shipped(name)
+        )
+        program = ComputeProgram(
+            resources, "trace", RAY_DEFINES, reads=(*RAY_READS, "rays"), writes=("distances",)
+        )
 
     def trace(hierarchy: RayHierarchy, origins, directions, longest=np.inf):
         rays = np.zeros((len(origins), 8), np.float32)
         rays[:, :3], rays[:, 3], rays[:, 4:7] = origins, longest, directions
-        given, found = context.buffer(rays), context.buffer(reserve=8 * len(rays))
-        given.bind_to_storage_buffer(0)
-        found.bind_to_storage_buffer(1)
-        hierarchy.bind()
-        program.run(-(-len(rays) // 64))
-        context.memory_barrier()
-        distances = np.frombuffer(found.read(), np.float32).reshape(-1, 2)
-        given.release()
-        found.release()
+        hierarchy.add_to(resources)
+        resources["rays"] = context.buffer(rays)
+        resources["distances"] = context.buffer(reserve=8 * len(rays))
+        program.dispatch(-(-len(rays) // 64))
+        distances = np.frombuffer(resources.read("distances"), np.float32).reshape(-1, 2)
         return distances[:, 0], distances[:, 1] > 0.0
 
     return trace

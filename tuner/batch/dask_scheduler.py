@@ -13,17 +13,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import distributed
+
 from vpltune.renderer.errors import MachineError
 from vpltune.tuner.batch.attempts import tune_in_own_process
 from vpltune.tuner.batch.job import Job
 from vpltune.tuner.batch.record import Records
 from vpltune.tuner.batch.supervised_process import Limits
 from vpltune.tuner.batch.tune_one import set_aside
-
-try:
-    import distributed
-except ModuleNotFoundError as error:
-    raise MachineError("--scheduler: Dask is not installed; try: pip install 'vpltune[cluster]'") from error
 
 CONNECT_SECONDS = 120.0
 """Time for the Dask scheduler to answer, at the start and after a lost connection. A choice."""

@@ -13,16 +13,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import submitit
+
 from vpltune.renderer.errors import InputError, MachineError
 from vpltune.tuner.batch.attempts import tune_with_retries
 from vpltune.tuner.batch.job import Job, read_jobs, write_jobs
 from vpltune.tuner.batch.record import Records
 from vpltune.tuner.batch.supervised_process import UNLIMITED_BYTES, Limits, SupervisedProcess
-
-try:
-    import submitit
-except ModuleNotFoundError as error:
-    raise MachineError("--slurm: submitit is not installed; try: pip install 'vpltune[cluster]'") from error
 
 POLL_SECONDS = 2.0
 """Interval between two checks of the tasks and records. A choice."""

@@ -7,25 +7,19 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from vpltune.renderer.errors import MachineError
-
 
 @contextlib.contextmanager
 def fit_curves(folder: Path, wanted: bool) -> Iterator[Callable[[dict[str, Any]], None]]:
     """Open the log, and yield a function to call with each `record` event. It does nothing unless `wanted`.
 
     Raises:
-        MachineError: tensorboardX is not installed.
+        ImportError: tensorboardX is not installed.
     """
     if not wanted:
         yield lambda record: None
         return
-    try:
-        from tensorboardX import SummaryWriter
-    except ModuleNotFoundError as error:
-        raise MachineError(
-            "--tensorboard: tensorboardX is not installed; try: pip install 'vpltune[tensorboard]'"
-        ) from error
+    from tensorboardX import SummaryWriter
+
     now = datetime.datetime.now(datetime.UTC).strftime("%Y%m%dT%H%M%S")
     with SummaryWriter(str(folder / "tensorboard" / now)) as writer:
         yield lambda record: _add_scene(writer, folder, record)

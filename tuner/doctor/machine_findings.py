@@ -11,7 +11,10 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Literal
+
+from vpltune.tuner.doctor.extras import how_to_install, missing_modules
 
 State = Literal["ok", "fallback", "missing"]
 
@@ -50,21 +53,30 @@ class Probe:
     """The command that fixes it."""
     required: bool
     """Whether the program does not work without it."""
+    extra: str = ""
+    """The extra that it checks. Without that extra it is not run and nothing is required."""
 
 
 # Commands that fix a finding.
 APT_OPENGL = "apt-get install -y libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri"
 APT_LLVM = "apt-get install -y libllvm19"
-PIP = f"{sys.executable} -m pip install --require-hashes -r requirements.txt"
+_REQUIREMENTS = Path(__file__).resolve().parents[2] / "requirements.txt"
+# An installed package has no requirements.txt beside it.
+PIP = (
+    f"{sys.executable} -m pip install --require-hashes -r {_REQUIREMENTS}"
+    if _REQUIREMENTS.is_file()
+    else f"{sys.executable} -m {how_to_install('tuner')}"
+)
 
 # All checks, in the order of the table.
 PROBES = (
     Probe("python", "apt-get install -y python3.11 python3.11-venv", True),
     Probe("egl", APT_OPENGL, True),
     Probe("opengl", APT_OPENGL, True),
-    Probe("jax", PIP, True),
-    Probe("llvm", APT_LLVM, False),
-    Probe("mitsuba", PIP, True),
+    Probe("extras", PIP, False),
+    Probe("jax", PIP, True, "tuner"),
+    Probe("llvm", APT_LLVM, False, "tuner"),
+    Probe("mitsuba", PIP, True, "tuner"),
     Probe("cache", "export VPLTUNE_CACHE=/a/folder/that/can/be/written", False),
 )
 
@@ -79,6 +91,9 @@ def run_probe(
     probe: Probe, seconds: float = PROBE_SECONDS, module: str = "vpltune.tuner.doctor.machine_probes"
 ) -> Finding:
     """Run one probe in a separate process, for at most `seconds`. A crash or a timeout is a finding too."""
+    if probe.extra and missing_modules(probe.extra):
+        detail = f"needs vpltune[{probe.extra}], which is not installed"
+        return Finding(probe.name, "missing", detail, mend=how_to_install(probe.extra), required=False)
     command = [sys.executable, "-m", module, probe.name]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=seconds, check=False)

@@ -12,6 +12,7 @@ import shutil
 import sys
 from collections.abc import Callable, Mapping
 
+from vpltune.tuner.doctor.extras import EXTRA_MODULES, how_to_install, missing_modules
 from vpltune.tuner.doctor.machine_findings import APT_LLVM, APT_OPENGL, PIP
 
 Said = Mapping[str, str]
@@ -65,6 +66,19 @@ def probe_opengl() -> Said:
             "detail": detail,
             "fallback": "Mesa renders on the CPU: the same images, but slower",
         }
+    return {"state": "ok", "detail": detail}
+
+
+def probe_extras() -> Said:
+    """The extras that are installed. Without `tuner` there is only the runtime."""
+    missing = {extra: modules for extra in EXTRA_MODULES if (modules := missing_modules(extra))}
+    parts = {
+        "installed": [extra for extra in EXTRA_MODULES if extra not in missing],
+        "not installed": [f"{extra} (no {', '.join(modules)})" for extra, modules in missing.items()],
+    }
+    detail = "; ".join(f"{part}: {', '.join(names)}" for part, names in parts.items() if names)
+    if "tuner" in missing:
+        return {"state": "missing", "detail": detail, "mend": how_to_install("tuner")}
     return {"state": "ok", "detail": detail}
 
 
@@ -140,6 +154,7 @@ PROBE_FUNCTIONS: Mapping[str, Callable[[], Said]] = {
     "python": probe_python,
     "egl": probe_egl,
     "opengl": probe_opengl,
+    "extras": probe_extras,
     "jax": probe_jax,
     "llvm": probe_llvm,
     "mitsuba": probe_mitsuba,

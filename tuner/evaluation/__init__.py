@@ -1,1 +1,1 @@
-"""Evaluation: views, their references, and the measures that accept or reject a fit."""
+"""Evaluation: views with their references, and the measures by which a fit is accepted or rejected."""

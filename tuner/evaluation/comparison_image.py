@@ -1,4 +1,4 @@
-"""Reference, default, tuned and ceiling side by side: whole images, indirect light, signed error."""
+"""comparison.png: reference, default, tuned and ceiling as whole images, indirect light and signed error."""
 
 import math
 from collections.abc import Mapping
@@ -17,9 +17,12 @@ from vpltune.tuner.metrics.view_metrics import ViewMetrics
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
 PANEL_WIDTH, PANEL_HEIGHT = 320, 240
-"""Pixels that a panel has at least."""
+"""Least size of a panel, in pixels. A choice."""
 _MARGIN = 8
+"""Pixels around a panel. A choice."""
 _CAPTION = 22
+"""Height of the caption above a panel, in pixels. A choice that fits a font of 14."""
+# Luminance of linear sRGB: IEC 61966-2-1.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 Irradiance = Float32[np.ndarray, "height width 3"]
@@ -28,9 +31,14 @@ Pixels = UInt8[np.ndarray, "rows columns 3"]
 
 
 def write_comparison(path: Path, runtime: Runtime, views: tuple[tuple[str, EvaluatedView], ...]) -> None:
-    """Write three rows for each view, with what it is shown for: whole images, indirect light, signed error.
+    """Write three rows of panels for each view: whole images, indirect light and signed error.
 
-    Pixels are repeated, never blended, until a panel has `PANEL_WIDTH` × `PANEL_HEIGHT` of them.
+    Pixels are repeated, never blended, until a panel has at least `PANEL_WIDTH` × `PANEL_HEIGHT` of them.
+
+    Args:
+        path: the .png to write.
+        runtime: maps radiance to display colours.
+        views: each with the reason that it is shown for.
 
     Raises:
         InputError: the path cannot be written to.
@@ -44,7 +52,10 @@ def write_comparison(path: Path, runtime: Runtime, views: tuple[tuple[str, Evalu
 def image_row(
     runtime: Runtime, view: CapturedView, irradiance: Mapping[str, Irradiance], panel_height: int
 ) -> Pixels:
-    """The reference, and beside it images of the same view with other indirect irradiance, by caption."""
+    """One row of panels: the reference, then an image for each indirect irradiance [W/m²], by caption.
+
+    All have the reference's exposure. Pixels are repeated until a panel has `panel_height` of them.
+    """
     reference = view.reference_radiance()
     exposure = _exposure(reference, view)
     size = (1, panel_height)
@@ -55,7 +66,7 @@ def image_row(
 
 
 def captioned(name: str, metrics: ViewMetrics) -> str:
-    """A panel's caption: whose image it is, and how far from the reference."""
+    """Caption of a panel: the variant's name and its errors."""
     if math.isnan(metrics.relmse):
         return f"{name}: no indirect light to compare with"
     return f"{name}: relMSE {metrics.relmse:.3g}, energy {metrics.energy_ratio:.2f}, FLIP {metrics.flip:.3f}"
@@ -84,7 +95,7 @@ def _rows(runtime: Runtime, evaluated: EvaluatedView, shown_for: str) -> list[Pi
 
 
 def _exposure(radiance: Irradiance, view: CapturedView) -> float:
-    """What brings the mean luminance to the runtime's key."""
+    """The exposure that brings the mean luminance to `EXPOSURE_KEY`; 1 for a black image."""
     level = float((radiance[view.valid] @ _LUMINANCE).mean()) if view.valid.any() else 0.0
     return EXPOSURE_KEY / level if level > 0.0 else 1.0
 

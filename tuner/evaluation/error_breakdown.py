@@ -1,18 +1,18 @@
-"""The error that is left, split by cause: one term of the image swapped at a time, and measured again.
+"""Splits the error of the tuned image by cause: replaces one term at a time, and measures again.
 
-Every share is the relMSE that goes away with its cause, over the fitted views:
+Each share is the relMSE that disappears with its cause, a mean over the fitted views:
 
-- `noise`: the reference's own, which no image is without.
-- `finite_n`: with R rotations of the point table, errors E₁ of single images and E_R of their mean,
-  infinitely many rotations would leave E = E_R − (E₁ − E_R)/(R − 1): the variance of a mean falls as 1/R.
-- `clamping`: that E, less the error with eight times the VPLs (of clustered discs, at most 4,096), whose
-  footprints, and with them the reach of α, are √8 times smaller. (α = 0 in their place would measure the
-  bright dots that α is there to prevent.)
-- `visibility`: the tuned image, less the ceiling's, which is the same VPLs with rays for visibility.
-- `filter`: the runtime's image, less a plain gather's of the same VPLs.
-- `missing_bounces`: against all bounces, less against one, where all bounces were asked for.
-- `remainder`: what these leave. Causes act on each other, so it may be negative, as may any share whose cause
-  makes up for another's.
+- `noise`: the noise of the reference, which is part of every relMSE.
+- `finite_n`: noise of the VPL placement. Let R rotations of the point table give the mean error E₁ of single
+  images and the error E_R of their mean image. The variance of a mean falls as 1/R, so infinitely many
+  rotations would leave E∞ = E_R − (E₁ − E_R)/(R − 1). The share is E₁ − E∞.
+- `clamping`: E∞ minus the error with eight times the VPLs (at most 4,096 clustered disc lights). Their
+  footprints, and with them the reach of α, are √8 times smaller. α = 0 would instead measure the bright dots
+  that α prevents.
+- `visibility`: error of the tuned image minus that of the ceiling, the same VPLs with ray-traced visibility.
+- `filter`: error of the runtime's image minus that of a plain gather of the same VPLs.
+- `missing_bounces`: error against all bounces minus error against one, if the reference has all bounces.
+- `remainder`: the rest. It is negative if causes overlap, and a share is negative if its cause hides another.
 """
 
 from collections.abc import Callable
@@ -37,7 +37,9 @@ from vpltune.tuner.surrogate.virtual_point_lights import gather_inputs
 from vpltune.tuner.surrogate.vpl_visibility import map_visibility
 
 ROTATIONS = 4
+"""R, the rotations of the point table. A choice."""
 MORE_VPLS = 8
+"""Factor of the VPL count for `clamping`. A choice."""
 _MOST_VPLS = next(spec.high for spec in ARTIST_PARAMETERS if spec.name == "vpl_count")
 
 
@@ -47,11 +49,20 @@ def error_breakdown(
     options: SceneOptions,
     progress: Callable[[float], None] | None = None,
 ) -> dict[str, float | str]:
-    """relMSE by cause, means over the fitted views that light reaches, and `views`, which says so.
+    """Split the tuned error by cause; the module's docstring defines the shares.
 
     Args:
-        options: what `prepared` was made with.
+        prepared: the scene, its runtime and its views.
+        evaluation: of `prepared`.
+        options: those that `prepared` was made with.
         progress: called with the share done, in [0, 1].
+
+    Returns:
+        relMSE by cause, means over the fitted views that indirect light reaches, and the key `views` with the
+        value "fitted". There are no causes if all these views are unlit.
+
+    Raises:
+        MachineError: the GPU ran out of memory or reported an error.
     """
     views = [each for each in evaluation.views if each.view.view.split == "fitted" and each.view.lit]
     less: tuple[ReferenceView | None, ...] = (None,) * len(views)
@@ -72,7 +83,7 @@ def _of_view(
     view, tuned = evaluated.view, evaluated.tuned
     total = evaluated.metrics["tuned"].relmse
     single, endless = _errors_of_rotations(runtime, view, tuned)
-    # More clustered discs than that are drawn as points: another model, and no measure of clamping.
+    # More VPLs than can be clustered would be drawn as points, which is another model.
     parameters = tuned.parameters
     most = LARGEST_DISC_COUNT if parameters.lloyd_iterations > 0 else _MOST_VPLS
     count = min(MORE_VPLS * parameters.vpl_count, max(most, parameters.vpl_count))
@@ -92,8 +103,8 @@ def _of_view(
 
 
 def _errors_of_rotations(runtime: Runtime, view: CapturedView, config: TunedConfig) -> tuple[float, float]:
-    """relMSE of one image, on average, and of infinitely many of them."""
-    # Evenly over the torus: rotations of a table that lie apart err independently of each other.
+    """E₁ and E∞ of the module's docstring."""
+    # R2 steps spread the rotations evenly over the torus, so that their errors are independent.
     shifts = (np.arange(ROTATIONS)[:, None] * np.array([0.7548776662, 0.5698402910])) % 1.0
     images = [
         runtime.capture(

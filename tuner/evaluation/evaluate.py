@@ -1,7 +1,7 @@
-"""Default, tuned and ceiling against the reference, on fitted and on held-out views.
+"""Measures default, tuned and ceiling against the reference, on fitted and on held-out views.
 
-The ceiling is the same VPLs with ray-traced visibility towards every pixel, fitted in its turn: what is left
-of its error no choice of the falloff parameters can take away.
+The ceiling has the same VPLs with ray-traced visibility at every pixel, and falloff parameters fitted to
+that. No choice of falloff parameters can remove the error that it has left.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,7 +27,7 @@ from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, gather
 from vpltune.tuner.surrogate.wide_vectors import wide_jit
 
 CEILING_TURNS = 2
-"""Reweightings of the ceiling's fit, which begins with the tuned parameters."""
+"""Reweighting iterations of the ceiling's fit, which begins at the tuned parameters. A choice."""
 VARIANTS = ("default", "tuned", "ceiling")
 SPLITS = ("fitted", "held_out")
 
@@ -36,29 +36,33 @@ _gather = wide_jit(gather)
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedView:
-    """The three images of one view and how far each is from the reference."""
+    """The three images of one view, and their errors against the reference."""
 
     view: CapturedView
     tuned: TunedConfig
+    """The config that `tuned` was drawn with in this view; a prior sets its parameters view by view."""
     irradiance: dict[str, Float32[np.ndarray, "height width 3"]]
-    """By variant: `default` and `tuned` as the runtime draws them, `ceiling` from the surrogate."""
+    """Indirect irradiance [W/m²] by variant: `default` and `tuned` from the runtime, `ceiling` from the
+    surrogate."""
     metrics: dict[str, ViewMetrics]
+    """Errors by variant."""
     noise_floor: float
+    """relMSE that the reference's noise alone adds."""
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """All views, and the parameters that the ceiling was fitted to."""
+    """All views, and the fitted parameters of the ceiling."""
 
     views: tuple[EvaluatedView, ...]
     ceiling_parameters: ArtistParameters
 
     def summary(self) -> dict[str, Any]:
-        """Means over the views of each split: the `metrics` that `fit` and `evaluate` report."""
+        """Mean metrics of each split by variant: the key `metrics` of what `fit` and `evaluate` report."""
         return {split: self._split(split) for split in SPLITS}
 
     def per_view(self) -> list[dict[str, Any]]:
-        """The same figures view by view."""
+        """Metrics, parameters and reference samples of each view: the key `per_view`."""
         return [
             {
                 "name": evaluated.view.view.name,
@@ -72,17 +76,16 @@ class Evaluation:
         ]
 
     def notes(self) -> tuple[str, ...]:
-        """What the figures do not say of themselves, a sentence each."""
+        """Remarks on the figures, one sentence each."""
         unlit = [each.view.view.name for each in self.views if not each.view.lit]
         if not unlit:
             return ()
         return (f"no indirect light reaches {', '.join(unlit)}: relMSE and energy ratio have no value there",)
 
     def most_and_least_gained(self) -> tuple[tuple[str, EvaluatedView], ...]:
-        """The views in which tuned gained most and least over default by trimmed relMSE, each with these
-        words.
+        """The views in which tuned gains most and least over default, by trimmed relMSE, with a label each.
 
-        One view where there is but one; the first where light reaches none.
+        This is one view if both are the same, and the first view if indirect light reaches none.
         """
         measured = [
             (each.metrics["tuned"].trimmed_relmse / each.metrics["default"].trimmed_relmse, index)
@@ -116,13 +119,21 @@ def evaluate(
     known: Sequence[CapturedView] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Evaluation:
-    """Measure every view.
+    """Measure default, tuned and ceiling in every view.
 
     Args:
+        scene: traced for the ceiling's visibility.
+        runtime: draws the same scene.
         views: captured with the VPLs of `tuned`.
-        tuned: None takes for each view what it was captured with, as a prior set it.
-        known: other captures of the same views, whose images need not be drawn again.
+        default: the config that `tuned` is compared with.
+        tuned: the config to measure. None takes the config that each view was captured with, where a prior
+            set the parameters.
+        seed: selects the pixels that the ceiling is fitted to.
+        known: other captures of the same views; images that they hold are not drawn again.
         progress: called with the share done, in [0, 1].
+
+    Raises:
+        MachineError: the GPU ran out of memory or reported an error.
     """
     visibilities = []
     for index, view in enumerate(views):
@@ -182,10 +193,13 @@ def surrogate_irradiance(
     parameters: ArtistParameters,
     visibility: Visibility | None = None,
 ) -> Float32[np.ndarray, "height width 3"]:
-    """The surrogate's indirect irradiance of a whole view, zero where nothing is seen."""
+    """The surrogate's indirect irradiance of a whole view [W/m²]; zero where no surface is seen.
+
+    `visibility` has a row for each pixel with a surface; None takes all VPLs to be visible.
+    """
     valid = view.captured.valid
     count = int(valid.sum())
-    # Views of one size have differing numbers of receivers; repeating some shares the compiled gather.
+    # The number of receivers differs between views; repeating some lets views share the compiled gather.
     repeated = np.arange(count + -count % PIXELS_STEP) % max(count, 1)
     receivers, vpls = gather_inputs(view.captured, repeated)
     seen = None if visibility is None else jnp.asarray(visibility, jnp.float32)[repeated]

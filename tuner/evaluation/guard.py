@@ -1,10 +1,14 @@
-"""Decides on validation views whether a fit is better than its start, and keeps the start where it is not.
+"""Decides on validation views whether a fit is better than its start, and keeps the start if it is not.
 
-Every candidate is drawn by the runtime in views that it was not fitted to. For each measure, the logarithm of
-candidate over start in each view is averaged over the views, with a margin from its spread: Student's
-one-sided bound with CONFIDENCE. A candidate is accepted where at least one measure is better beyond its
-margin, none may be worse than TOLERANCE within it, and the energy is no farther from 1 by more than
-ENERGY_TOLERANCE. relMSE and FLIP are both among the measures, so neither is bought with the other.
+The runtime draws every candidate in views that it was not fitted to. For each measure, log(candidate/start)
+is averaged over the views; its upper bound is Student's one-sided bound at confidence `CONFIDENCE`. A
+candidate is accepted if
+
+- the bound of at least one of `MEASURES` is below `LEAST_GAIN`,
+- no measure, flicker included, has a bound or a ratio of means over the views above `TOLERANCE`, and
+- the mean of |1 − energy ratio| grows by at most `ENERGY_TOLERANCE`.
+
+relMSE and FLIP are both measures, so a gain in one cannot be paid for with the other.
 """
 
 import math
@@ -18,7 +22,7 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.tuner.metrics.view_metrics import ViewMetrics
 
 MEASURES = ("relmse", "trimmed_relmse", "median_error", "flip")
-"""What a candidate is judged by; by its flicker too, where that was measured."""
+"""Measures that a candidate is judged by; flicker is added if it was measured."""
 WORDS = {
     "relmse": "relMSE",
     "trimmed_relmse": "trimmed relMSE",
@@ -27,68 +31,68 @@ WORDS = {
     "flicker": "flicker",
 }
 CONFIDENCE = 0.9
+"""Confidence of a measure's bound. A choice, made before measuring."""
 TOLERANCE = 1.02
-"""Ratio to the start up to which a measure counts as not worse: what a fit promises on views that chose
-nothing."""
+"""Ratio to the start up to which a measure counts as not worse. A choice, made before measuring: what a fit
+promises on views that it did not see."""
 LEAST_GAIN = 0.99
 """Ratio to the start below which a measure counts as better. A choice: less than 1 % is not worth a
 change."""
 ENERGY_TOLERANCE = 0.01
-"""What the mean of |1 − energy ratio| over the views may grow by."""
+"""Most that the mean of |1 − energy ratio| over the views may grow. A choice."""
 UNSEEN = {"relmse": 1e-5, "trimmed_relmse": 1e-5, "median_error": 1e-3, "flip": 1e-3, "flicker": 1e-3}
-"""Added to both sides of a ratio, so that errors too small to see do not decide. A choice: 0.1 % of error
-in the median pixel, 0.3 % root mean square in relMSE, and a FLIP of 0.001."""
+"""Added to both sides of a ratio, so that invisible errors do not decide. A choice: 0.1 % error in the median
+pixel, 0.3 % root mean square in relMSE, and a FLIP of 0.001."""
 CHOSEN = {
-    "placement": "; chosen: the placement, with the falloff that its fit began with",
+    "placement": "; chosen: the tuned placement, with the falloff that the fit started from",
     "halfway": "; chosen: halfway to the tuned parameters",
-    "auto": "; chosen: what `auto` sets",
+    "auto": "; chosen: the parameters that `auto` sets",
 }
-"""What the sentence of an accepted fit says where it is not the tuned parameters."""
+"""End of an accepted fit's sentence if the choice is not the tuned parameters."""
 PREFERRED = 0.99
-"""Score from which on a candidate takes the place of an earlier, simpler one."""
+"""A candidate replaces a simpler one if its score is below this share of the other's. A choice."""
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """One candidate against the start."""
+    """One candidate compared with the start."""
 
     name: str
     parameters: ArtistParameters
     ratios: dict[str, float]
-    """Geometric mean over views of candidate over start, by measure."""
+    """candidate/start by measure, the geometric mean over the views; below 1 is better."""
     bounds: dict[str, float]
-    """The ratio that each measure stays below with CONFIDENCE."""
+    """Upper bound of each ratio at confidence `CONFIDENCE`."""
     energy_change: float
     """Change of the mean of |1 − energy ratio|; below 0 is better."""
     means_worse: dict[str, float]
-    """The ratio of the means over views, of measures in which it is above TOLERANCE whatever single views
-    say."""
+    """Ratio of the measure's means over the views, for measures in which it is above `TOLERANCE`."""
 
     @property
     def better(self) -> tuple[str, ...]:
-        """Measures that are better by `LEAST_GAIN` beyond their margin."""
+        """Names of the measures whose bound is below `LEAST_GAIN`."""
         return tuple(name for name in MEASURES if self.bounds[name] < LEAST_GAIN)
 
     @property
     def worse(self) -> tuple[str, ...]:
-        """Measures that may be worse, in words with the ratio that they may reach."""
+        """Measures that may be worse, in words, with the ratio that they may reach."""
         measures = [
             f"{WORDS[name]} up to ×{max(self.bounds[name], self.means_worse.get(name, 0.0)):.2f}"
             for name in self.bounds
             if self.bounds[name] > TOLERANCE or name in self.means_worse
         ]
         if self.energy_change > ENERGY_TOLERANCE:
-            measures.append(f"energy off by {self.energy_change:.2f} more")
+            measures.append(f"energy error up by {self.energy_change:.2f}")
         return tuple(measures)
 
     @property
     def accepted(self) -> bool:
-        """Better in one measure and worse in none."""
+        """Whether the candidate is better in at least one measure and worse in none."""
         return bool(self.better) and not self.worse
 
     @property
     def score(self) -> float:
-        """Geometric mean of the ratios."""
+        """Geometric mean of the ratios over `MEASURES`; below 1 is better."""
         return math.exp(fmean(math.log(self.ratios[name]) for name in MEASURES))
 
 
@@ -99,10 +103,12 @@ class Verdict:
     chosen: Judgement | None
     """None keeps the start."""
     judgements: tuple[Judgement, ...]
+    """All candidates whose measures are finite."""
     sentence: str
+    """The reason, for the user."""
 
     def document(self) -> dict[str, object]:
-        """What metrics.json says of it."""
+        """The key `validation` of metrics.json."""
         return {
             "chosen": "start" if self.chosen is None else self.chosen.name,
             "tolerance": TOLERANCE,
@@ -125,14 +131,14 @@ def verdict(
     start: Sequence[ViewMetrics],
     candidates: Mapping[str, tuple[ArtistParameters, Sequence[ViewMetrics]]],
 ) -> Verdict:
-    """Choose among candidates, the simplest first.
+    """Choose among candidates.
 
     Args:
-        start: metrics of the start in each validation view that light reaches; two or more.
-        candidates: parameters and metrics in the same views, by name.
+        start: metrics of the start in each lit validation view; two or more.
+        candidates: parameters, and metrics in the same views, by name, the simplest first.
     """
     if not _finite(start):
-        return Verdict(None, (), "the start's images hold what is no number; the start is kept")
+        return Verdict(None, (), "the start's images contain NaN or infinity; the start is kept")
     judged = tuple(
         judgement(name, parameters, start, metrics)
         for name, (parameters, metrics) in candidates.items()
@@ -152,7 +158,7 @@ def _finite(metrics: Sequence[ViewMetrics]) -> bool:
 def judgement(
     name: str, parameters: ArtistParameters, start: Sequence[ViewMetrics], metrics: Sequence[ViewMetrics]
 ) -> Judgement:
-    """One candidate against the start over the same views, two or more."""
+    """Compare one candidate with the start over the same views, two or more; all metrics must be finite."""
     ratios, bounds, means_worse = {}, {}, {}
     flickers = all(math.isfinite(each.flicker) for each in (*start, *metrics))
     for measure in (*MEASURES, "flicker") if flickers else MEASURES:
@@ -176,10 +182,10 @@ def _sentence(chosen: Judgement | None, judged: Sequence[Judgement], views: int)
         figures = ", ".join(f"{WORDS[name]} ×{chosen.ratios[name]:.2f}" for name in MEASURES)
         return f"better than the start on {views} validation views: {figures}{CHOSEN.get(chosen.name, '')}"
     if not judged:
-        return "nothing differs from the start; the start is kept"
+        return "no candidate differs from the start; the start is kept"
     best = min(judged, key=lambda each: each.score)
     why = f"{best.name} may be worse in {', '.join(best.worse)}" if best.worse else "no gain is beyond chance"
     return (
-        f"no candidate is better than the start on {views} validation views and worse in nothing ({why}); "
-        "the start is kept"
+        f"on {views} validation views, no candidate is better than the start in one measure and worse in "
+        f"none ({why}); the start is kept"
     )

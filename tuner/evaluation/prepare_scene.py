@@ -1,4 +1,4 @@
-"""From a scene file to views with references and captured buffers: what `fit` and `evaluate` share."""
+"""Prepares a scene for `fit` and `evaluate`: views, their references, and the runtime's buffers."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -18,49 +18,54 @@ from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
 from vpltune.tuner.surrogate.compiled_functions import keep_compiled_functions
 
 Progress = Callable[[str, float], None]
+"""Called with the name of a stage and the share of it that is done, in [0, 1]."""
 
 VIEW_SIZE = (64, 48)
-"""Pixels of the fitted and measured views. More and smaller views tell more than few large ones: neighbouring
-pixels err together, and a view's time goes into its VPLs' visibility maps, whatever its size."""
+"""Default width and height of views, in pixels. A choice: many small views carry more information than few
+large ones, because errors of neighbouring pixels are correlated and a view's time goes into its visibility
+maps, whatever its size."""
 LEAST_VALIDATION = 3
-"""Validation views at least: the spread between two says next to nothing."""
+"""Least number of validation views. A choice: the spread between two says very little."""
 NOISE_TARGET = 5e-4
-"""Noise floor, in relMSE, at which a reference is good enough: 2 % of a pixel's irradiance."""
+"""Noise floor, in relMSE, at which a reference is done. A choice: 2 % of a pixel's irradiance."""
 MAX_SAMPLES = 4096
-"""Samples per pixel in each half, where the noise target is not reached before."""
+"""Samples per pixel and half at which a reference is done at the latest. A choice."""
 
 
 @dataclass(frozen=True, eq=False)
 class SceneOptions:
-    """What a scene is prepared with.
-
-    camera, light: in place of what the file, its sidecar or the placement would give.
-    views: how many views are fitted; as many, but at least LEAST_VALIDATION, validate a fit.
-    held_out: how many views are held out; None takes half as many as are fitted, but at least one.
-    fixed_views: these and no others; camera, light, views, seed and size then do not place any.
-    split_error: whether to split the tuned error by cause, which draws some more frames.
-    """
+    """How a scene is prepared."""
 
     views: int = 4
+    """Number of fitted views. As many views, but at least `LEAST_VALIDATION`, validate a fit."""
     held_out: int | None = None
+    """Number of held-out views; None takes half as many as are fitted, but at least one."""
     seed: int = 0
     bounces: Literal["1", "all"] = "1"
+    """Bounces of indirect light in the references."""
     camera: Camera | None = None
+    """Replaces the camera of the file, of its sidecar or of the automatic placement."""
     light: Light | None = None
+    """Replaces the lights of the file, of its sidecar or of the automatic placement."""
     size: tuple[int, int] = VIEW_SIZE
+    """Width and height of the views, in pixels."""
     fixed_views: tuple[View, ...] | None = None
+    """Uses exactly these views; `views`, `held_out`, `camera`, `light` and `size` are then ignored."""
     split_error: bool = False
+    """Whether to split the tuned error by cause, which draws some more frames."""
 
 
 @dataclass
 class Stopwatch:
-    """Seconds spent by stage."""
+    """Measures the seconds that each stage takes."""
 
     seconds: dict[str, float] = field(default_factory=dict)
+    """Seconds so far, by stage."""
     started: float = field(default_factory=time.perf_counter)
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
+        """Add the time of the block to stage `name`."""
         before = time.perf_counter()
         try:
             yield
@@ -68,7 +73,7 @@ class Stopwatch:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - before
 
     def report(self) -> dict[str, float]:
-        """Seconds of every stage, and `total` since the stopwatch was made."""
+        """Seconds of each stage, and `total` since the stopwatch was created."""
         return {**self.seconds, "total": time.perf_counter() - self.started}
 
 
@@ -79,11 +84,11 @@ class PreparedScene:
     scene: Scene
     runtime: Runtime
     views: tuple[CapturedView, ...]
-    """The fitted and the held-out views, as drawn with the config that the scene was prepared with."""
+    """The fitted and held-out views, captured with the config that the scene was prepared with."""
     validation: tuple[tuple[View, ReferenceView], ...]
-    """The views that choose between candidates, with their references; none where nothing is to be chosen."""
+    """The validation views with their references; empty unless `prepare_scene` was asked for them."""
     notes: tuple[str, ...]
-    """What was ignored in the file, and which camera and light were chosen."""
+    """Remarks for the user: what was ignored in the file, and which camera and light were chosen."""
 
 
 def prepare_scene(
@@ -95,21 +100,27 @@ def prepare_scene(
     *,
     validated: bool = False,
 ) -> PreparedScene:
-    """Read, place views, render references, and capture the runtime's buffers with `config`.
+    """Read a scene, place its views, render their references, and capture the runtime's buffers.
 
     Args:
-        validated: whether there are to be validation views, which cost a reference each.
+        scene_path: a scene file.
+        options: views, references, camera and light.
+        config: drawn in the fitted and held-out views.
+        watch: measures the stages "load", "reference" and "capture".
+        progress: called with the name of a stage and the share of it that is done, in [0, 1].
+        validated: whether to place validation views too, which cost a reference each, and to measure the
+            statistics that a prior reads.
 
     Raises:
         InputError: the scene or its sidecar cannot be used.
-        MachineError: no OpenGL.
+        MachineError: there is no OpenGL 4.5, or the GPU ran out of memory.
     """
     keep_compiled_functions()
     with watch.stage("load"):
         progress("load", 0.0)
         scene = read_scene(scene_path)
         views, notes = _views(scene, scene_path, options, validated)
-        # Before the long work: a machine without OpenGL says so at once.
+        # Before the references, so that a machine without OpenGL fails at once.
         runtime = Runtime(scene)
     with watch.stage("reference"):
         references = references_of(
@@ -134,7 +145,10 @@ def references_of(
     bounces: Literal["1", "all"],
     progress: Callable[[float], None] | None = None,
 ) -> tuple[ReferenceView, ...]:
-    """References of `views`, as every fit and evaluation takes them."""
+    """References of `views` at the noise target of fits and evaluations, from the cache if they are there.
+
+    `progress` is called with the share of all views done, in [0, 1].
+    """
     return reference_views(
         scene,
         views,

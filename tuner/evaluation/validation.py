@@ -1,4 +1,4 @@
-"""Draws candidates in validation views: the evidence that `tuner.evaluation.guard` judges by."""
+"""Draws candidates in validation views and measures them; `tuner.evaluation.guard` judges by the result."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -18,11 +18,14 @@ from vpltune.tuner.reference.reference_view import ReferenceView
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
 FITTED_SPACE = SearchSpace(tuple(spec for spec in ARTIST_PARAMETERS if spec.fitted))
+"""The unit cube of all fitted parameters."""
 
 
 def between(first: ArtistParameters, second: ArtistParameters, share: float) -> ArtistParameters:
-    """The point at `share` of the way between two in the unit cube of the fitted parameters; the rest is
-    `second`'s."""
+    """Interpolate in the unit cube of the fitted parameters: `first` at a share of 0, `second` at 1.
+
+    Parameters that are not fitted are those of `second`.
+    """
     start, end = (FITTED_SPACE.point(each) for each in (first, second))
     return FITTED_SPACE.parameters(start + share * (end - start), second)
 
@@ -33,15 +36,19 @@ def candidates(
     tuned: ArtistParameters,
     auto: ArtistParameters | None,
 ) -> dict[str, ArtistParameters]:
-    """What validation chooses between beside the start, the simplest first; none equals the start or another.
+    """The candidates that validation compares with the start, the simplest first.
+
+    No two of them are equal, and none equals the start.
 
     Args:
-        base: the tuned placement with the falloff and visibility that its fit began with.
-        auto: what the learnt prior sets; None where it does not apply.
+        start: parameters that the fit started from.
+        base: the tuned placement with the falloff and visibility that its fit started from.
+        tuned: the fitted parameters.
+        auto: the parameters that the learnt prior sets; None if it does not apply.
     """
     named = {"placement": base, "halfway": between(base, tuned, 0.5), "tuned": tuned}
     if base == tuned:
-        # There is nothing between them but rounding.
+        # Halfway would differ from both by rounding only.
         named = {"placement": base}
     if auto is not None:
         named["auto"] = auto
@@ -61,18 +68,21 @@ def validation_metrics(
     motion: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[dict[str, list[ViewMetrics]], tuple[CapturedView, ...]]:
-    """Metrics of every candidate in every view that light reaches, means over the rotations.
+    """Measure every candidate in every lit view, averaged over rotations of the point table.
 
     Args:
-        runtime: of the views' scene.
+        runtime: draws the views' scene.
         views: with their references.
-        configs: by name, without a prior; those with one placement share VPLs and maps.
-        rotations: of the point table.
+        configs: candidates by name, without a prior. Those with equal placement share VPLs and maps.
+        rotations: rotations of the point table, at least one.
         motion: whether to measure flicker too, which draws everything twice.
         progress: called with the share done, in [0, 1].
 
     Returns:
-        Metrics by name, and all views as captured with the first config, without maps.
+        Metrics of the lit views by candidate, and all views as captured with the first config, without maps.
+
+    Raises:
+        MachineError: the GPU ran out of memory or reported an error.
     """
     groups: dict[tuple, list[str]] = {}
     for name, each in configs.items():
@@ -101,7 +111,7 @@ def validation_metrics(
                     drawn[name].append(metrics)
         if captured_views[-1].lit:
             for name, of_rotations in drawn.items():
-                # A rotation without a value is not to vanish in a mean: it is what the guard has to see.
+                # `mean_metrics` skips NaN, but the guard must see it: pass that rotation on.
                 broken = [each for each in of_rotations if not math.isfinite(each.relmse)]
                 measured[name].append(broken[0] if broken else mean_metrics(of_rotations))
         if progress is not None:

@@ -1,16 +1,16 @@
-"""images.npz: what a fit keeps of its views, so that a report can show them under any exposure.
+"""images.npz: the images of a fit's views, which a report can show at any exposure.
 
-One file for a fit. For every view that is kept, under the prefix of its place in metrics.json's `per_view`:
+There is one file for each fit. The members of a view have its index in metrics.json's `per_view` as prefix:
 
-    0/level                 float32   the reference's mean irradiance, direct and indirect, in W/m²
-    0/valid                 bool      [height, width]      where runtime and reference see a surface
+    0/level                 float32   mean irradiance of the reference, direct and indirect, in W/m²
+    0/valid                 bool      [height, width]      where runtime and reference see the same surface
     0/reference_albedo      float16   [height, width, 3]
     0/reference_direct      float16   [height, width, 3]   irradiance over `level`
     0/reference_indirect    float16   [height, width, 3]
-    0/albedo, 0/direct                                     as the runtime has them
+    0/albedo, 0/direct                                     the same in the runtime
     0/default_indirect, 0/tuned_indirect, 0/ceiling_indirect
 
-Row 0 is at the top. Irradiance over its mean fits half floats whatever the scene's units are.
+Row 0 is at the top. Irradiance relative to its mean fits half floats at any scale and in any unit.
 """
 
 import zipfile
@@ -29,10 +29,11 @@ from vpltune.tuner.metrics.radiance import radiance
 
 VARIANTS = ("default", "tuned", "ceiling")
 MAXIMUM_PIXELS = 256 * 192
-"""Of a view: a larger one is kept as every second, third … pixel of every such row."""
+"""Most pixels of a view that are kept; a larger view keeps every second, third … row and column. A choice."""
 MAXIMUM_VIEWS = {"fitted": 16, "held_out": 8}
-"""The first of each split; with `MAXIMUM_PIXELS` this bounds the file by 60 MB."""
-# A damaged archive shows itself in any of these; TypeError is that of a lone array, which is no archive.
+"""Number of views that are kept of each split, the first ones. A choice: with `MAXIMUM_PIXELS`, it limits the
+file to 60 MB."""
+# What numpy raises for a damaged archive; TypeError is for a file with a single array, which is no archive.
 _UNREADABLE = (
     OSError,
     ValueError,
@@ -47,38 +48,41 @@ _LARGEST_HALF = float(np.finfo(np.float16).max)
 
 @dataclass(frozen=True, eq=False)
 class ViewImages:
-    """One view: surfaces, direct light and all the indirect irradiances that were compared.
-
-    Irradiance is in units of `level`.
-    """
+    """One view: albedo, direct irradiance, and indirect irradiance of each variant, in units of `level`."""
 
     index: int
-    """Place in `per_view`."""
+    """The view's index in metrics.json's `per_view`."""
     level: float
-    """W/m²"""
+    """Mean irradiance of the reference [W/m²]."""
     valid: Bool[np.ndarray, "height width"]
+    """Where runtime and reference see the same surface."""
     reference_albedo: Float32[np.ndarray, "height width 3"]
     reference_direct: Float32[np.ndarray, "height width 3"]
     albedo: Float32[np.ndarray, "height width 3"]
     direct: Float32[np.ndarray, "height width 3"]
     indirect: dict[str, Float32[np.ndarray, "height width 3"]]
-    """Of `reference` and of each of `VARIANTS`."""
+    """By variant: `reference`, and each of `VARIANTS`."""
 
     def radiance(self, variant: str) -> Float32[np.ndarray, "height width 3"]:
-        """The whole image, direct and indirect, in `level`/sr; `variant` may be `reference`."""
+        """Direct plus indirect radiance, in `level`/sr.
+
+        Args:
+            variant: `reference`, with the reference's albedo, or one of `VARIANTS`.
+        """
         if variant == "reference":
             return radiance(self.reference_albedo, self.reference_direct, self.indirect[variant])
         return radiance(self.albedo, self.direct, self.indirect[variant])
 
     def light(self, variant: str) -> Float32[np.ndarray, "height width 3"]:
-        """As `radiance`, all variants with the runtime's albedo, and black where not valid: what FLIP
-        compares."""
+        """As `radiance`, but all with the runtime's albedo, and black where not valid: what FLIP compares."""
         direct = self.reference_direct if variant == "reference" else self.direct
         return radiance(self.albedo, direct, self.indirect[variant]) * self.valid[..., None]
 
 
 def write_view_images(path: Path, views: Sequence[Any]) -> None:
-    """Write what `tuner.evaluation.evaluate` made of each view (`EvaluatedView`), whole or not at all.
+    """Write the images of evaluated views (`tuner.evaluation.evaluate.EvaluatedView`) to images.npz.
+
+    The file appears only once it is complete.
 
     Raises:
         InputError: the path cannot be written to.
@@ -121,10 +125,10 @@ def _members(evaluated: Any) -> dict[str, np.ndarray]:
 
 
 def read_view_images(path: Path) -> tuple[ViewImages, ...]:
-    """The views that `path` holds, in the order of metrics.json; none where there is no such file.
+    """Read images.npz: the views that it holds, in the order of metrics.json; none if there is no file.
 
     Raises:
-        InputError: not an images.npz, or its members do not fit together.
+        InputError: the file is not an images.npz, a member is missing, or one has the wrong shape or type.
     """
     if not path.exists():
         return ()

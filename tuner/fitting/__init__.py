@@ -1,1 +1,1 @@
-"""Fitting: the least-squares problem, its descent, and how certain the result is."""
+"""Fitting: the least-squares problems, the descent that solves them, and the uncertainty of the result."""

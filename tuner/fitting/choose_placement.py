@@ -1,9 +1,9 @@
-"""Chooses where many VPLs stand, and what they shine as, by the images that the runtime draws.
+"""Chooses the placement of many VPLs, as points or clustered disc lights, by images that the runtime draws.
 
-With few VPLs the best density depends on falloff and maps, and `tuner.fitting.fit_density` fits both together. With
-many, the falloff hardly moves the error of a placement, while placements differ by factors: drawn with the
-defaults of its form, each is judged by the robust error of its images. Two views screen all placements; the
-best is then drawn in all.
+With few VPLs the best density depends on falloff and maps, so `tuner.fitting.fit_density` fits all of them
+together. With many, the errors of placements differ by factors, and the falloff hardly changes them. So each
+placement is drawn with the start's falloff, with α = 1 where discs replace points, and judged by the robust
+error of its images. Two views screen all placements, and the best one is drawn in the others too.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,22 +20,24 @@ from vpltune.tuner.metrics.robust_error import RobustError
 from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
 
 LLOYD_ITERATIONS = 2
-"""Lloyd iterations tried with many VPLs. A choice on development scenes:
-eight erred about as little, and took longer."""
+"""Lloyd iterations with many VPLs. A choice, made on development scenes: eight gave about the same error and
+took longer."""
 IMPORTANCES = (0.5, 1.0)
-"""η of the placements tried beside the start's own, at γ = 1."""
+"""η of the placements that are tried besides the start's own, at γ = 1. A choice, made on the scenes that
+docs/chosen_on.md names."""
 SCREENED = 2
-"""Views that all placements are drawn in."""
+"""Views in which all placements are drawn. A choice."""
 
 
 @dataclass(frozen=True, eq=False)
 class ChosenPlacement:
-    """The placement with the least error, drawn in every view."""
+    """The placement with the least error, and its images."""
 
     parameters: ArtistParameters
     views: tuple[CapturedView, ...]
+    """Every view, captured with `parameters`."""
     costs: dict[str, float]
-    """Cost over that of the start's own placement on the screened views, by what was tried; see
+    """Cost of each placement relative to the start's, a geometric mean over the screened views, by
     `placement_name`."""
 
 
@@ -48,13 +50,16 @@ def choose_placement(
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
 ) -> ChosenPlacement:
-    """The best of the start's own placement and clustered discs with more and more importance.
+    """Choose between the start's own placement and clustered disc lights with increasing importance η.
+
+    With more VPLs than can be clustered, the alternatives are points too.
 
     Args:
-        runtime: of the views' scene.
-        views: captured with `config`; light reaches each of them.
+        runtime: draws the views' scene.
+        views: captured with `config`; indirect light reaches each of them.
         config: holds the start's parameters.
-        errors: how errors count in each view, from `robust_errors` with the same seed.
+        errors: the robust error of each view, from `robust_errors` with the same seed.
+        seed: selects the pixels of each view.
         progress: called with the share done, in [0, 1].
     """
     start = config.parameters
@@ -65,7 +70,7 @@ def choose_placement(
     for index, parameters in enumerate(tried):
         drawn[parameters] = _captured(runtime, config.with_parameters(parameters), views[screened])
         ratios = _costs(drawn[parameters], errors[screened], seed) / np.maximum(own, 1e-30)
-        # The geometric mean: a view in which a placement is twice as good makes up for one with half as good.
+        # The geometric mean: half the error in one view makes up for twice the error in another.
         costs[placement_name(parameters)] = float(np.exp(np.mean(np.log(np.maximum(ratios, 1e-30)))))
         if progress is not None:
             progress((index + 1) / (len(tried) + 1))
@@ -77,13 +82,13 @@ def choose_placement(
 
 
 def placement_name(parameters: ArtistParameters) -> str:
-    """A placement in a few words, for metrics.json."""
+    """Name of a placement in metrics.json, for example "discs λ=2 γ=1 η=0.5"."""
     form = f"discs λ={parameters.lloyd_iterations}" if parameters.lloyd_iterations else "points"
     return f"{form} γ={parameters.density_exponent:g} η={parameters.density_importance:g}"
 
 
 def _placements(start: ArtistParameters) -> list[ArtistParameters]:
-    """Those other than the start's own; more VPLs than can be clustered stay points."""
+    """The alternatives to the start's placement; more VPLs than can be clustered stay points."""
     clustered = with_discs(start, LLOYD_ITERATIONS) if start.vpl_count <= LARGEST_DISC_COUNT else start
     tried = [
         replace(clustered, density_exponent=1.0, density_importance=importance) for importance in IMPORTANCES

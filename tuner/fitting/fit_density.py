@@ -1,18 +1,18 @@
-"""Fits where few VPLs stand, with all else, to the error that a finite number of them leaves.
+"""Fits the placement density of few VPLs, together with falloff and visibility maps.
 
-Every correctly weighted density has the same mean image, so none can be learned from it. What is fitted is
-the mean of the loss over several rotations of the point table (Cranley and Patterson 1976), the same ones for
-every candidate (common random numbers): it holds the bias of the falloff and the variance of the placement,
-and at few VPLs the best α, k and κ are others than at many.
+Every correctly weighted density has the same expected image, so that image cannot tell densities apart. The
+fit minimises the mean loss over several rotations of the point table (Cranley and Patterson 1976), the same
+ones for every candidate (common random numbers). This mean includes the bias of the falloff and the variance
+of the placement. With few VPLs the best α, k and κ are not those of many.
 
-Over (γ, η) the loss is measured, along one axis after the other, with falloff and maps fitted at every
-candidate: as density shifts, VPLs cross edges and corners, and in a Cornell box one step of 0.05 in seven
-goes against the smooth trend (row `density_slope_agreement` of `vpltune bench density`). Images drawn with
-the start's falloff would be cheaper to judge by, but where the falloff is what is wrong all densities look
-alike in them.
+The loss over (γ, η) is searched along one axis after the other, with falloff and maps refitted for every
+candidate. No gradient is used: as the density shifts, VPLs cross edges and corners, and in a Cornell box one
+step of 0.05 in seven goes against the smooth trend (row `density_slope_agreement`, `vpltune bench density`).
+It would be cheaper to judge images drawn with the start's falloff, but where that falloff is wrong, all
+densities look alike.
 
-Every candidate but the start's own has cells (`lloyd_iterations`): at few VPLs most of the error is that a
-point shines for all that lies around it, not where shadows fall.
+Every candidate except the start uses clustered disc lights (`lloyd_iterations`): with few VPLs, the point
+approximation dominates the error, not visibility.
 """
 
 import math
@@ -35,33 +35,37 @@ from vpltune.tuner.metrics.robust_error import RobustError
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
 ROTATIONS = 4
-"""Rotations of each view, so that four views have sixteen placements. The first is none at all: what the
-runtime draws with."""
+"""Rotations of each view: four views then give sixteen placements. The first one is the identity, which the
+runtime draws with. A choice."""
 HELD_OUT_ROTATIONS = 8
+"""Rotations on which a fit is measured, and which it does not see. A choice."""
 FEW_VPLS = 256
-"""Up to this many, the fit sees several rotations and the density is fitted; beyond, one placement is as good
-as any other."""
+"""Up to this many VPLs, the fit sees several rotations and fits the density. With more, one rotation is as
+good as another. A choice."""
 LLOYD_ITERATIONS = 8
-"""Steps towards the middles of cells (rows `relaxation_…` of `vpltune bench density`)."""
+"""Lloyd iterations of the candidates (rows `relaxation_…` of `vpltune bench density`). A choice."""
 DISC_FOOTPRINT = 1.0
-"""α where a fit of cells begins: discs as wide as their cells. Points do best at about half of that."""
+"""α at which a fit of clustered disc lights begins: each disc is as wide as its cluster. Points do best at
+about half of that."""
 _IMPORTANCES = (0.0, 0.5, 1.0)
-"""Of η, at γ = 1; one more between the middle and the better end."""
+"""η of the candidates at γ = 1; one more lies between the middle one and the better end. A choice."""
 _EXPONENTS = (0.75, 0.5, 0.25, 0.0)
-"""Of γ, at the best η, for as long as the loss falls."""
+"""γ of the candidates at the best η, tried in this order while the loss falls. A choice."""
 _TRIALS = len(_IMPORTANCES) + 3
-"""As a rule: the start's own, four of η, one of γ."""
+"""Typical number of candidates, for the progress: the start, four of η and one of γ."""
 _VIEW_SHIFT = (math.sqrt(2.0) - 1.0, math.sqrt(3.0) - 1.0)
-"""From a view's rotations to those of the next. R2's own step would give the same points but one."""
+"""Shift of the rotations from one view to the next. A choice, but not the step of the R2 sequence: that would
+give the same points, all but one."""
 
 Rotation = tuple[float, float]
+"""Shift of the point table on its torus, in [0, 1)²."""
 Density = tuple[float, float, int]
-"""γ, η, λ."""
+"""γ, η and λ."""
 
 
 @dataclass(frozen=True)
 class DensityTrial:
-    """One candidate: its densities, and its loss with falloff and maps at their best."""
+    """One candidate: its placement parameters, and its loss after falloff and maps were fitted."""
 
     density_exponent: float
     density_importance: float
@@ -71,24 +75,29 @@ class DensityTrial:
 
 @dataclass(frozen=True, eq=False)
 class DensityFit:
-    """The best candidate met, and all that were measured."""
+    """The best candidate, and the losses of all."""
 
     parameters: ArtistParameters
     descent: Descent
+    """That of the best candidate's falloff."""
     trials: tuple[DensityTrial, ...]
+    """All candidates, the start first."""
 
 
 def table_rotations(count: int, seed: int, *, held_out: bool = False) -> tuple[Rotation, ...]:
-    """`count` rotations of the point table; those that are held out share none with the others."""
+    """`count` random rotations of the point table.
+
+    The first one is the identity, unless `held_out`. Held-out rotations have a random stream of their own.
+    """
     random = np.random.default_rng([seed, int(held_out)])
     drawn = [tuple(float(x) for x in pair) for pair in random.random((count, 2))]
     return tuple(drawn) if held_out else ((0.0, 0.0), *drawn[1:])
 
 
 def view_rotations(rotations: Sequence[Rotation], index: int) -> tuple[Rotation, ...]:
-    """Those of one of several views: the first is everyone's, the others are shifted.
+    """The rotations of view number `index`: the first is unchanged, the others are shifted.
 
-    Views under the same lights would else have the same VPLs, and fewer placements would be seen.
+    Otherwise views under the same lights would have the same VPLs, and a fit would see fewer placements.
     """
     shift = index * np.array(_VIEW_SHIFT)
     moved = [tuple(float(x) for x in (np.array(rotation) + shift) % 1.0) for rotation in rotations[1:]]
@@ -101,7 +110,7 @@ def rotated_views(
     config: TunedConfig,
     rotations: Sequence[Rotation],
 ) -> tuple[CapturedView, ...]:
-    """Every view drawn with `config` at its rotations, against its one reference."""
+    """Capture every view at its rotations, view by view; all captures of a view share its reference."""
     return tuple(
         CapturedView(view.view, view.reference, captured)
         for index, view in enumerate(views)
@@ -115,8 +124,7 @@ def rotation_errors(
     config: TunedConfig,
     rotations: Sequence[Rotation],
 ) -> Float[np.ndarray, "views rotations"]:
-    """relMSE of the runtime's own image, free of the reference's noise (`tuner.metrics`), by view and
-    rotation; 0 where a view is unlit."""
+    """relMSE of the runtime's images, without the reference's noise; 0 if a view is unlit."""
     rotated = rotated_views(runtime, views, config, rotations)
     return np.array([_relmse(view) for view in rotated]).reshape(len(views), len(rotations))
 
@@ -131,16 +139,19 @@ def fit_density(
     robust: bool = True,
     progress: Callable[[float], None] | None = None,
 ) -> DensityFit:
-    """Density and falloff for the config's VPL count, robust over rotations of the point table.
+    """Fit density, falloff and visibility maps for the config's VPL count.
 
     Args:
-        runtime: of the views' scene; draws every candidate, with a full gather.
-        views: what to fit to, with references.
-        config: the count, where the falloff's fit begins, and what is not fitted.
-        seed: of rotations and pixels.
-        rotations: what to fit to; None takes `ROTATIONS` of them.
-        robust: whether to minimise the robust error of `tuner.metrics.robust_error`; else relMSE.
+        runtime: draws every candidate, with a full gather.
+        views: views of the runtime's scene, with their references.
+        config: the VPL count, where the fit of the falloff begins, and everything that is not fitted.
+        seed: selects rotations and pixels.
+        rotations: rotations to fit to; None takes `ROTATIONS` of them.
+        robust: minimise the robust error (`tuner.metrics.robust_error`) if True, else relMSE.
         progress: called with the share done, in [0, 1].
+
+    Returns:
+        The candidate with the least loss, which is the start if no other is better.
     """
     chosen = table_rotations(ROTATIONS, seed) if rotations is None else tuple(rotations)
     fits: dict[Density, tuple[ArtistParameters, Descent]] = {}
@@ -156,7 +167,7 @@ def fit_density(
             parameters = _with(start, density)
             drawn = rotated_views(runtime, views, config.with_parameters(parameters), chosen)
             if robust and errors is None:
-                # The start's own density comes first: its errors set the scale for all.
+                # The start is measured first: its images set the scale of the robust error for all.
                 errors = robust_errors(drawn, seed=seed)
             fit = fit_placement(drawn, parameters, errors, seed=seed)
             fits[density] = fit.parameters, fit.descent
@@ -168,10 +179,10 @@ def fit_density(
         trials = (DensityTrial(*density, descent.loss) for density, (_, descent) in fits.items())
         return DensityFit(*fits[best()], tuple(trials))
 
-    # The start itself is a candidate: the result is never worse than it.
+    # The start is a candidate, so the result is never worse.
     own = measure((start.density_exponent, start.density_importance, start.lloyd_iterations))
     if own.status.nothing_fitted:
-        # Nothing lit, or not finite: no density will mend it.
+        # Nothing is lit, or the loss is not finite: no density changes that.
         return result()
     low, middle, high = _IMPORTANCES
     losses = [measure((1.0, importance, LLOYD_ITERATIONS)).loss for importance in _IMPORTANCES]
@@ -191,7 +202,7 @@ def density_document(
     fit: DensityFit,
     seed: int,
 ) -> dict[str, Any]:
-    """What metrics.json says of it: the trials, and both errors on rotations that were not fitted to."""
+    """The key `density` of metrics.json: trials, and relMSE of default and tuned on held-out rotations."""
     rotations = table_rotations(HELD_OUT_ROTATIONS, seed, held_out=True)
     errors = {
         name: float(rotation_errors(runtime, views, config, rotations).mean())
@@ -207,7 +218,10 @@ def density_document(
 
 
 def with_discs(parameters: ArtistParameters, relaxation: int = LLOYD_ITERATIONS) -> ArtistParameters:
-    """Cells in place of points, each a disc of its own size; parameters that have cells are as they were."""
+    """`parameters` with clustered disc lights in place of points, at α = `DISC_FOOTPRINT`.
+
+    Parameters that have discs already are returned unchanged. `relaxation` is the number of Lloyd iterations.
+    """
     if parameters.lloyd_iterations > 0:
         return parameters
     return replace(parameters, lloyd_iterations=relaxation, falloff_footprint=DISC_FOOTPRINT)

@@ -1,7 +1,7 @@
 """Fits intensity and falloff to views with given weights, as one small least-squares problem.
 
-The image is linear in the intensity k, so at every point of the other parameters the best k has a closed
-form, and the fit moves over the others alone (variable projection, Golub and Pereyra 1973).
+The image is linear in the intensity k. For given values of the other parameters the best k therefore has a
+closed form, and the descent runs over the others alone (variable projection, Golub and Pereyra 1973).
 """
 
 from collections.abc import Callable
@@ -33,9 +33,17 @@ def fit_to(
     held: frozenset[str] = frozenset(),
     progress: Callable[[float], None] | None = None,
 ) -> tuple[ArtistParameters, Descent]:
-    """Fit to views that are ready for it; the parameters in `held` stay at the start's, k never does.
+    """Fit intensity and falloff to views.
 
-    The descent moves over all parameters but k, and is reported as if it had moved over all of them.
+    Args:
+        views: with weights and visibility; all count the same.
+        start: where the fit begins, and the values of parameters that are not fitted here.
+        held: names of parameters that keep the start's values. k is fitted even if it is named.
+        progress: called with the share of steps done, in [0, 1].
+
+    Returns:
+        The parameters, and the descent with its point in the cube of all `FALLOFF_SPECS`, k among them. If no
+        view is lit, these are the start and the status `NOTHING_LIT`.
     """
     data = tuple(view.reduced for view in views)
     if not any(jnp.any(view.factor != 0.0) for view in data):
@@ -60,7 +68,7 @@ def fit_to(
         status = FitStatus.NOT_FINITE if status.nothing_fitted else FitStatus.NO_IMPROVEMENT
         tuned = start
     elif status is FitStatus.NO_IMPROVEMENT:
-        # The closed form alone has done it.
+        # The closed form of k alone was an improvement.
         status = FitStatus.CONVERGED
     losses = np.concatenate([[start_loss], found.losses])
     return tuned, Descent(SearchSpace().point(tuned), min(found.loss, start_loss), start_loss, losses, status)
@@ -72,9 +80,9 @@ def _images_and_targets(falloff: FalloffParameters, data: Data) -> tuple[Array, 
 
 
 def _projected(images: Array, targets: Array) -> Float[Array, ""]:
-    """argmin over k in its range of |k·images − targets|²."""
+    """The k in its range that minimises |k·images − targets|²."""
     product = partial(jnp.matmul, precision=jax.lax.Precision.HIGHEST)
-    # 1e-30: where no light arrives at all, any k will do.
+    # 1e-30: without light every k is equally good, and 0/0 is not.
     best = product(images, targets) / jnp.maximum(product(images, images), 1e-30)
     return jnp.clip(best, _INTENSITY.low, _INTENSITY.high)
 
@@ -92,7 +100,7 @@ def _squares(falloff: FalloffParameters, data: Data) -> Float[Array, ""]:
 
 @lru_cache
 def all_residuals(space: SearchSpace) -> Residuals:
-    """Residuals over all of `space`, k like the others; what they are given is the reduced views."""
+    """Residuals over all of `space`, k included; their data are the reduced views."""
 
     def residuals(point: Float[Array, " parameters"], data: Data) -> Float[Array, " rows"]:
         images, targets = _images_and_targets(FalloffParameters(**space.values(point)), data)
@@ -103,7 +111,7 @@ def all_residuals(space: SearchSpace) -> Residuals:
 
 @lru_cache
 def _residuals(space: SearchSpace) -> Residuals:
-    # One function object for each space: the compiled fit is found again by it.
+    # JAX caches compiled code by the function object; `lru_cache` makes one for each space.
     def residuals(
         point: Float[Array, " parameters"], given: tuple[Data, FalloffParameters]
     ) -> Float[Array, " rows"]:

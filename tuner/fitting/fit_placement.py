@@ -1,10 +1,10 @@
-"""Fits everything that acts on VPLs where they stand: intensity, falloff, and bias and softness of the maps.
+"""Fits intensity, falloff, and the bias and softness of visibility maps, for one placement of the VPLs.
 
-The robust error (`tuner.metrics.robust_error`) is lowered by iteratively reweighted least squares: each turn
-rebuilds the small problem of `tuner.surrogate.reduced_gather` with new weights from the table, which costs
-milliseconds, and fits the falloff to it. Bias and softness are fitted after the falloff in the first turn,
-and again for as long as they move; they move only where that pays, since in most scenes the loss is all but
-flat in them.
+The robust error (`tuner.metrics.robust_error`) is minimised by iteratively reweighted least squares. Each
+iteration, here called a turn, rebuilds the reduced problem of `tuner.surrogate.reduced_gather` with new
+weights, which takes milliseconds, and fits the falloff to it. The first turn then fits bias and softness;
+later turns do so as long as these still move. They move only where that lowers the loss enough
+(`tuner.fitting.fit_visibility`), because in most scenes the loss is almost flat in them.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,21 +28,21 @@ from vpltune.tuner.surrogate.tabulated_gather import TabulatedGather, gather_tab
 from vpltune.tuner.surrogate.vpl_gather import FalloffParameters
 
 TURNS = 4
-"""Reweightings at most."""
+"""Default limit on the turns. A choice."""
 SETTLED = 1e-3
-"""Relative fall of the cost over a turn below which the fit counts as settled."""
+"""The fit has converged when a turn lowers the cost by less than this share. A choice."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlacementFit:
-    """The best parameters met, with VPLs where they stand."""
+    """The best parameters met for one placement of the VPLs."""
 
     parameters: ArtistParameters
     descent: Descent
     """Its losses are the cost at the start and after every turn."""
     views: tuple[FitView, ...]
-    """Ready for `tuner.fitting.uncertainty`, with the best parameters' visibility and the weights of the last
-    turn."""
+    """The views with the visibility of `parameters` and the weights of the last turn, ready for
+    `tuner.fitting.uncertainty`."""
 
 
 def fit_placement(
@@ -55,16 +55,20 @@ def fit_placement(
     turns: int = TURNS,
     progress: Callable[[float], None] | None = None,
 ) -> PlacementFit:
-    """The parameters that bring the views closest to their references, all views counting the same.
+    """Fit to the references of views, which all count the same.
 
     Args:
-        views: at least one; where they have visibility maps, bias and softness are fitted too.
-        start: where to begin, and what the other parameters stay at.
-        errors: how errors count in each view, from `robust_errors` with the same seed; None minimises relMSE.
-        seed: of the choice of pixels.
-        visibility: for each view, of every pixel with a surface and every VPL, in place of its maps.
-        turns: reweightings at most.
+        views: at least one. If all have visibility maps, bias and softness are fitted too.
+        start: where to begin, and the values of all other parameters.
+        errors: the robust error of each view, from `robust_errors` with the same seed; None minimises relMSE.
+        seed: selects the pixels of each view.
+        visibility: for each view, whether each VPL is visible from each pixel with a surface; replaces maps.
+        turns: limit on the reweighting iterations.
         progress: called with the share done, in [0, 1].
+
+    Returns:
+        The best parameters met: those of the start with the status `NO_IMPROVEMENT` if none are better, or
+        with the status of the descent if nothing could be fitted.
     """
     known = [None] * len(views) if visibility is None else visibility
     pixels = [view_pixels(view, seen, seed=seed) for view, seen in zip(views, known, strict=True)]
@@ -95,7 +99,7 @@ def fit_placement(
             progress((turn + 1) / turns)
         if costs[-2] - costs[-1] <= SETTLED * abs(costs[-1]):
             break
-    # A cost that is not a number is not the least.
+    # NaN must not count as the minimum.
     best = int(np.argmin(np.where(np.isnan(costs), np.inf, costs)))
     if found[best] != current:
         ready = [
@@ -115,7 +119,10 @@ def ready_views(
     *,
     seed: int = 0,
 ) -> tuple[FitView, ...]:
-    """The views with the weights and the visibility that they have at `parameters`, which are not fitted."""
+    """The views with weights and visibility at `parameters`, ready for `tuner.fitting.uncertainty`.
+
+    Nothing is fitted. `errors` and `seed` as in `fit_placement`.
+    """
     ready = []
     for view, error in zip(views, errors, strict=True):
         pixels = view_pixels(view, seed=seed)
@@ -134,7 +141,8 @@ def _image(table: TabulatedGather, parameters: ArtistParameters) -> Float[np.nda
 def _cost(
     views: Sequence[FitView], errors: Sequence[RobustError] | None, parameters: ArtistParameters
 ) -> float:
-    """The mean over views: of the robust error, or of relMSE without the reference's noise."""
+    """Mean over the views of the robust error, or of relMSE without the reference's noise if `errors` is
+    None."""
     images = [_image(view.table, parameters) for view in views]
     if errors is None:
         targets = [view.target for view in views]

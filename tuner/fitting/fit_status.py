@@ -1,4 +1,4 @@
-"""How a descent and a fit end. One that fails is a status with a sentence, never an exception."""
+"""How a descent and a fit end. A failure is a status with a sentence, never an exception."""
 
 import enum
 from dataclasses import dataclass
@@ -8,11 +8,13 @@ import numpy as np
 from jaxtyping import Float
 
 Outcome = Literal["improved", "kept", "unlit", "doubtful"]
-"""How a fit ended, as metrics.json, configs, records and reports have it.
+"""How a fit ended, as in metrics.json, configs, batch records and reports.
 
-`improved`: better than the start on validation views in some measure, and worse in none. `kept`: nothing
-was, and the start is kept. `unlit`: no indirect light reaches the fitted views, so there is nothing to fit.
-`doubtful`: the views or their references do not serve to judge by; the start is kept.
+- `improved`: on the validation views, the result is better than the start in at least one measure and worse
+  in none (`tuner.evaluation.guard`).
+- `kept`: no candidate was, so the start is kept.
+- `unlit`: no indirect light reaches the fitted views, so there is nothing to fit.
+- `doubtful`: the views or their references cannot be used to judge a fit, so the start is kept.
 """
 
 
@@ -27,18 +29,19 @@ class FitStatus(enum.Enum):
 
     @property
     def nothing_fitted(self) -> bool:
-        """Whether there was nothing that could be fitted."""
+        """Whether the descent could not run at all."""
         return self in (FitStatus.NOTHING_LIT, FitStatus.NOT_FINITE)
 
 
 @dataclass(frozen=True, eq=False)
 class Descent:
-    """The best point met, which is never worse than the start."""
+    """The result of a descent: the best point met, which is never worse than the start."""
 
     point: Float[np.ndarray, " parameters"]
     """In the unit cube."""
     loss: float
+    """At `point`; NaN where there is nothing to fit."""
     start_loss: float
     losses: Float[np.ndarray, " steps"]
-    """The loss at every step, the start first."""
+    """The loss at the start and after every step."""
     status: FitStatus

@@ -1,10 +1,10 @@
 """Fits bias β and softness σ of the visibility maps.
 
-Both act on a pair of receiver and VPL through one number, its overlap
-(`tuner.surrogate.vpl_visibility.surface_overlap`). With the falloff held, each receiver's VPLs are summed once
-over a grid of overlaps. Irradiance is then a matrix product of these sums with the visible share at each
-overlap, so a step costs microseconds (`tuner.surrogate.reduced_gather`). `tuner.fitting.fit_placement` fits
-falloff and visibility in turns.
+Both act on a pair of receiver and VPL through one number, the overlap of
+`tuner.surrogate.vpl_visibility.surface_overlap`. With the falloff held, each receiver's VPLs are binned once
+by overlap. Irradiance is then the product of these sums with the visible share at each bin, and the reduced
+problem (`tuner.surrogate.reduced_gather`) makes a step cost microseconds. `tuner.fitting.fit_placement`
+alternates between falloff and visibility.
 """
 
 from collections.abc import Sequence
@@ -29,17 +29,18 @@ from vpltune.tuner.surrogate.vpl_visibility import VisibilityParameters, seen_sh
 from vpltune.tuner.surrogate.wide_vectors import wide_jit
 
 LEAST_GAIN = 0.02
-"""Share of the loss that a move must gain. A choice: without it, bias and softness wandered over a flat
-loss, and raised the held-out relMSE of one development scene to 1.8 times."""
+"""Least relative fall of the loss for which bias and softness move. A choice: without it they wandered over a
+flat loss, and raised the held-out relMSE of one development scene to 1.8 times."""
 AT_BOUND = 1e-3
-"""Share of the cube's side: nearer to its wall, a parameter is at its bound."""
+"""Distance from a bound, as a share of the range, below which a parameter counts as at it. A choice."""
 STARTS = 9
 """Points along each axis of the grid whose best one the descent starts from. A choice."""
 NODES = 96
-"""Nodes of the overlap grid, each a tenth above the one before. With half as many, planted values are missed
-by a tenth."""
+"""Nodes of the overlap grid, each about a tenth above the one before. With half as many, planted values are
+missed by a tenth."""
 PAIRS_AT_ONCE = 2**13
-"""Pairs of receiver and VPL in a chunk: their shares at all nodes take 3 MiB."""
+"""Pairs of receiver and VPL in a chunk: their weights at all nodes take 3 MiB."""
+# Overlap of the first node, the least bias, and of the last, the largest bias plus the largest softness.
 _LEAST = VISIBILITY_SPECS[0].low
 _MOST = sum(spec.high for spec in VISIBILITY_SPECS)
 
@@ -49,7 +50,10 @@ SPACE = SearchSpace(VISIBILITY_SPECS)
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class ReducedVisibility:
-    """One view with its falloff held. |factor · (1, seen at the nodes) − target|² + offset is its loss."""
+    """The reduced problem of one view with its falloff held.
+
+    With v the visible share at the nodes, the loss of the view is |factor · (1, v) − target|² + offset.
+    """
 
     factor: Float[Array, "rows columns"]
     target: Float[Array, " rows"]
@@ -59,10 +63,15 @@ class ReducedVisibility:
 def fit_maps(
     pixels: Sequence[ViewPixels], targets: Sequence[Target], start: ArtistParameters
 ) -> ArtistParameters:
-    """`start` with the bias and softness that bring the views closest to their targets, its falloff held.
+    """Fit bias and softness with the falloff of `start` held.
 
-    They stay at the start's where moving them lowers the loss by less than `LEAST_GAIN`, or drives one of
-    them to a bound of its range: then the views do not determine them.
+    Both keep the start's values if moving them lowers the loss by less than `LEAST_GAIN`, or drives one of
+    them to a bound of its range: the views do not determine them then.
+
+    Args:
+        pixels: the fitted pixels of each view; a view without maps is left out.
+        targets: their references and weights.
+        start: falloff, and where the fit begins.
     """
     falloff = FalloffParameters.of(start)
     reduced = tuple(
@@ -80,10 +89,10 @@ def fit_maps(
 def fit_visibility_to(
     views: tuple[ReducedVisibility, ...], start: ArtistParameters
 ) -> tuple[ArtistParameters, Descent]:
-    """Bias and softness for views whose falloff is held.
+    """Fit bias and softness to reduced views.
 
-    The descent begins at the best of `start` and a grid: few pairs overlap by a little, so far from the best
-    place the loss is all but flat.
+    The descent begins at the best point of `start` and a grid. Few pairs have a small overlap, so far from
+    the optimum the loss is almost flat.
     """
     offset = float(sum(view.offset for view in views)) / len(views)
     side = np.linspace(0.0, 1.0, STARTS)
@@ -104,7 +113,7 @@ def _squares(
 def residuals(
     point: Float[Array, " parameters"], views: tuple[ReducedVisibility, ...]
 ) -> Float[Array, " rows"]:
-    """Of all views, each counting the same, at a point of the unit cube."""
+    """Residuals of all views, which count the same, at a point of the unit cube of `SPACE`."""
     values = SPACE.values(point)
     parameters = VisibilityParameters(values["visibility_bias"], values["visibility_softness"])
     seen = jnp.concatenate([jnp.ones(1), seen_share(jnp.asarray(overlap_nodes()), parameters)])
@@ -113,7 +122,8 @@ def residuals(
 
 
 def overlap_nodes() -> Float[np.ndarray, " nodes"]:
-    """The grid: below its first node all is seen, beyond its last nothing, whatever the parameters."""
+    """The overlap grid. For any bias and softness in range, pairs below the first node are fully visible and
+    pairs beyond the last are not visible at all."""
     return np.geomspace(_LEAST, _MOST, NODES).astype(np.float32)
 
 
@@ -124,7 +134,7 @@ def reduce_visibility(
     target: Target,
     falloff: FalloffParameters,
 ) -> ReducedVisibility:
-    """The small problem of one view for the falloff given."""
+    """The reduced problem of one view for a given falloff; lengths in units of L."""
     return ReducedVisibility(*reduce_columns(_sums(receivers, vpls, overlap, falloff), target))
 
 
@@ -135,10 +145,10 @@ def _sums(
     overlap: Float[Array, "receivers vpls"],
     falloff: FalloffParameters,
 ) -> Float[Array, "receivers 3 columns"]:
-    """Sums over VPLs: what is always visible, then the rest by overlap, shared linearly in its logarithm
-    between two nodes.
+    """Irradiance [W/m²] by overlap: column 0 is always visible, the others belong to the nodes.
 
-    One matrix product for each receiver, which is faster than a pass over all pairs for each node.
+    A pair between two nodes is divided between them linearly in the logarithm of the overlap. One matrix
+    product per receiver is faster than a pass over all pairs per node.
     """
     axes = vpl_axes(vpls)
     step = np.log(_MOST / _LEAST) / (NODES - 1)
@@ -148,7 +158,7 @@ def _sums(
         squared, form_at = pair_forms(Receivers(position, normal), vpls, axes)
         transmittance = jnp.exp(-falloff.extinction_coefficient * jnp.sqrt(squared))
         form = falloff.intensity / jnp.pi * form_at(falloff.falloff_footprint) * transmittance
-        # Positions along the nodes, from 0; what is always seen has a column of its own, at -1.
+        # Position along the nodes, from 0; what is always visible is at -1, the first column.
         place = jnp.where(overlap > _LEAST, jnp.log(jnp.maximum(overlap, _LEAST) / _LEAST) / step, -1.0)
         share = jnp.maximum(1.0 - jnp.abs(place[:, :, None] - columns), 0.0)
         return jnp.matmul(form[:, None, :] * vpls.flux.T, share, precision="highest")

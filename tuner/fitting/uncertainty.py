@@ -1,17 +1,19 @@
-"""How sure a fit is: an interval for each parameter, what it trades with, and what the scene leaves open.
+"""Uncertainty of a fit: an interval for each parameter, correlated parameters, and undetermined ones.
 
-Neighbouring pixels err together, by what the model leaves out far more than by the reference's noise, so
-pixels cannot be counted as witnesses: tiles of the views can. With J the Jacobian of the residuals r,
-H = JᵀJ, and H_b, g_b = J_bᵀ r_b those of tile b alone, leaving a tile out moves the optimum by
-(H − H_b)⁻¹ g_b. The jackknife (Bell and McCaffrey 2002, "CR3") takes the covariance of the parameters from
-these moves,
+Errors of neighbouring pixels are correlated, by model error far more than by the reference's noise. So pixels
+are not independent observations; tiles of the views are taken to be. With J the Jacobian of the residuals r,
+H = JᵀJ, and H_b and g_b = J_bᵀ r_b those of tile b alone, leaving out tile b moves the optimum by
+m_b = (H − H_b)⁻¹ g_b. For B tiles, the jackknife (Bell and McCaffrey 2002, "CR3") estimates the parameters'
+covariance from these moves:
 
     C = (B − 1)/B Σ_b m_b m_bᵀ
 
-which holds noise and misfit and does not shrink where few tiles tell all. The interval of a parameter is
-where its profile, the least sum of squares with all others at their best, rises by less than t² C/H⁻¹: for a
-parabola that is Student's interval, and where the loss flattens out, as towards small α, it goes on. t has as
-many degrees of freedom as tiles tell about the parameter (Carter, Schnepel and Steigerwald 2017), less one.
+It includes noise and misfit, and it does not shrink if only few tiles carry information.
+
+The profile of a parameter is the least sum of squares over all others. The interval is where the profile
+rises by less than t² C_ii/(H⁻¹)_ii. For a parabola this is Student's interval; where the loss flattens out,
+as towards small α, it extends further. t is Student's quantile for the effective degrees of freedom: the
+effective number of tiles (Carter, Schnepel and Steigerwald 2017), less one.
 """
 
 from collections.abc import Callable
@@ -34,32 +36,36 @@ from vpltune.tuner.surrogate.tabulated_gather import gather_tabulated
 from vpltune.tuner.surrogate.vpl_gather import FalloffParameters
 
 CONFIDENCE = 0.9
+"""Confidence level of the intervals. A choice."""
 OPEN_SHARE = 1.0 / 3.0
-"""Of a parameter's range, on its own scale: an interval that is wider says nothing."""
+"""Share of a parameter's range, on its own scale. A wider interval means that the views do not determine the
+parameter. A choice."""
 PRIOR_COST = 0.01
-"""Of the sum of squares, which a parameter may cost that goes back to the prior."""
+"""Relative rise of the sum of squares up to which a parameter with a wide interval returns to the prior. A
+choice."""
 AT_BOUND = 1e-3
-"""Share of the cube's side: nearer to its wall, a parameter is at its bound."""
+"""Distance from a bound, as a share of the range, below which a parameter counts as at it. A choice."""
 REACH = np.geomspace(1e-3, 1.0, 16)
-"""Of the cube's side: how far from the optimum a profile is asked, on either side."""
+"""Distances from the optimum, on either side, at which a profile is evaluated, as shares of the cube's side.
+A choice."""
 TRADING = 0.8
-"""Correlation from which on two parameters are said to trade with each other."""
+"""Absolute correlation from which two parameters are reported to trade with each other. A choice."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """What is known of one parameter after a fit."""
+    """The confidence interval of one fitted parameter."""
 
     value: float
     low: float
     high: float
-    """The interval that holds the truth with CONFIDENCE, within the parameter's range."""
+    """Ends of the interval at confidence `CONFIDENCE`, within the parameter's range."""
     determined: bool
-    """False where the views do not tell, and `value` is the prior's."""
+    """Whether the views determine the parameter. If not, `fit_with_intervals` sets `value` to the prior's."""
     trades_with: tuple[str, ...]
-    """Parameters that could move along with it at little cost."""
+    """Names of the parameters that it is correlated with by `TRADING` or more."""
     at_bound: float | None = None
-    """The bound of its range that the fit ran to, where `value` is the prior's for that reason."""
+    """The bound of its range that the fit ran to, which makes it undetermined; else None."""
 
 
 def fit_with_intervals(
@@ -68,11 +74,21 @@ def fit_with_intervals(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[ArtistParameters, Descent, dict[str, Interval]]:
-    """Fit from `prior`, and go back to it in what the views leave open, one by one, refitting the rest.
+    """Fit from `prior`, then return undetermined parameters to it one by one, refitting the others.
 
-    A parameter is left open where its interval is wide and going back costs next to nothing, or where the fit
-    runs to a bound of its range that the prior is not at: what lies beyond the range cannot be meant. Where
-    that is the intensity, which no other parameter can stand in for, all of them go back to the prior.
+    A parameter is undetermined if its interval is wider than `OPEN_SHARE` and returning it costs at most
+    `PRIOR_COST`, or if the fit runs to a bound of its range that the prior is not at, because a value beyond
+    the range makes no sense. The intensity is an exception, because no other parameter can stand in for it:
+    the width of its interval does not count, and if it runs to a bound, all parameters return to the prior.
+
+    Args:
+        views: with the weights and visibility that the fit ended with.
+        prior: where the fit begins, and the values that undetermined parameters return to.
+        progress: called with the share of the first fit done, in [0, 1].
+
+    Returns:
+        The parameters, the descent of the last fit, and the interval of each fitted parameter by name. There
+        are no intervals if nothing could be fitted.
     """
     names = frozenset(SearchSpace().names)
     tuned, descent = fit_to(views, prior, progress=progress)
@@ -95,7 +111,7 @@ def fit_with_intervals(
         found[name] = _open(known[name], prior, name, bound)
         tuned, descent = without, at_prior
         known = intervals(views, tuned, names - frozenset(found)) | found
-    # With whom a parameter trades is asked of all of them together, before any was held.
+    # Correlations are those of the first fit, in which no parameter was held.
     return (
         tuned,
         descent,
@@ -110,8 +126,11 @@ def fit_with_intervals(
 def open_intervals(
     views: tuple[FitView, ...], tuned: ArtistParameters, names: frozenset[str], prior: ArtistParameters
 ) -> dict[str, Interval]:
-    """Intervals at `tuned`, which stays as it is; a parameter that is left open, or at a bound of its range
-    that `prior` is not at, is not determined."""
+    """Intervals at `tuned`, which is not changed.
+
+    A parameter counts as undetermined if its interval is wider than `OPEN_SHARE`, or if it is at a bound of
+    its range that `prior` is not at. `names` are the parameters that were fitted.
+    """
     known = intervals(views, tuned, names)
     bounds = {name: _bound(name, tuned, prior) for name in known}
     return {
@@ -127,12 +146,16 @@ def open_intervals(
 def intervals(
     views: tuple[FitView, ...], tuned: ArtistParameters, names: frozenset[str]
 ) -> dict[str, Interval]:
-    """Intervals of the parameters in `names` at the optimum `tuned`, all others taken to be known."""
+    """Intervals of the parameters in `names` at the optimum `tuned`; all others are taken as known.
+
+    Each is returned as determined: callers decide.
+    """
     space = SearchSpace()
     chosen = [index for index, name in enumerate(space.names) if name in names]
     slope, curvature = _tiles(views, space, jnp.asarray(space.point(tuned), jnp.float32))
     slope, curvature = slope[:, chosen], curvature[:, chosen][:, :, chosen]
-    # In units in which every parameter has curvature 1: one that hardly shows is not one that is known.
+    # Scale each parameter to curvature 1. Otherwise the 1e-9 in `_inverse` would make a parameter that hardly
+    # changes the image look well determined.
     unit = 1.0 / np.sqrt(np.maximum(np.diag(curvature.sum(axis=0)), 1e-30))
     slope, curvature = slope * unit, curvature * np.outer(unit, unit)
     total = curvature.sum(axis=0)
@@ -144,7 +167,7 @@ def intervals(
     student = stdtrit(np.maximum(witnesses - 1.0, 1.0), (1.0 + CONFIDENCE) / 2.0)
     allowed = student**2 * spread / np.diag(inverse)
     ends = _profile_ends(views, space.point(tuned), chosen, allowed)
-    # For the correlations alone: a tile without which nothing is known moves the optimum out of the cube.
+    # For the correlations only: leaving out the one informative tile moves the optimum far out of the cube.
     moves = np.clip(moves, -1.0, 1.0)
     covariance = moves.T @ moves
     deviation = np.maximum(np.sqrt(np.diag(covariance)), 1e-30)
@@ -171,7 +194,7 @@ def _profile_ends(
     axes: list[int],
     allowed: Float[np.ndarray, " axes"],
 ) -> tuple[Float[np.ndarray, " axes"], Float[np.ndarray, " axes"]]:
-    """Where the profile of each axis has risen by what is allowed; the cube's wall where it never does."""
+    """Where the profile of each axis has risen by `allowed`, below and above; the bound if it never does."""
     data, residuals = tuple(view.reduced for view in views), all_residuals(SearchSpace())
     free = np.isin(np.arange(len(point)), axes)
     ends = np.empty((2, len(axes)))
@@ -179,9 +202,9 @@ def _profile_ends(
         for side, sign in enumerate((-1.0, 1.0)):
             places = np.clip(point[axis] + sign * np.concatenate([[0.0], REACH]), 0.0, 1.0)
             squares = profile(residuals, data, point, axis, places, free) * len(views)
-            # Standing still is not beyond what stood still before: a profile of rounded sums may dip.
+            # Rounding may make a profile dip: make it monotonic.
             rise = np.maximum.accumulate(np.maximum(squares - squares[0], 0.0))
-            # Roots of rises, which for a parabola are straight lines.
+            # Interpolate the root, which is linear for a parabola.
             ends[side, row] = (
                 np.interp(np.sqrt(allowance), np.sqrt(rise) + 1e-12 * np.arange(len(rise)), places)
                 if rise[-1] > allowance
@@ -196,8 +219,7 @@ def _open(interval: Interval, prior: ArtistParameters, name: str, bound: float |
 
 
 def _bound(name: str, tuned: ArtistParameters, prior: ArtistParameters) -> float | None:
-    """The bound that a fit ran to; None where it is inside the range, or the prior is at that bound
-    itself."""
+    """The bound that a fit ran to; None if it is inside the range, or if the prior is at that bound too."""
     (spec,) = (spec for spec in SearchSpace().specs if spec.name == name)
     axis = SearchSpace((spec,))
     place, before = float(axis.point(tuned)[0]), float(axis.point(prior)[0])
@@ -208,7 +230,7 @@ def _bound(name: str, tuned: ArtistParameters, prior: ArtistParameters) -> float
 
 
 def _width(name: str, interval: Interval) -> float:
-    """Of an interval, in shares of the parameter's range on its own scale."""
+    """Width of an interval, as a share of the parameter's range on its own scale."""
     (spec,) = (spec for spec in SearchSpace().specs if spec.name == name)
     axis = SearchSpace((spec,))
     low, high = (
@@ -224,14 +246,14 @@ def _with(point: np.ndarray, axes: list[int], values: np.ndarray) -> np.ndarray:
 
 
 def _inverse(matrix: Float[np.ndarray, "n n"]) -> Float[np.ndarray, "n n"]:
-    """Of a positive matrix of size about 1, finite where there is a direction in which it is zero."""
+    """Inverse of a positive semidefinite matrix with entries of about 1; finite even if it is singular."""
     return np.linalg.inv(matrix + 1e-9 * np.eye(len(matrix)))
 
 
 def _tiles(
     views: tuple[FitView, ...], space: SearchSpace, point: Float[Array, " parameters"]
 ) -> tuple[Float[np.ndarray, "tiles n"], Float[np.ndarray, "tiles n n"]]:
-    """Jᵀr and JᵀJ of every tile of every view that has something to say."""
+    """Jᵀr and JᵀJ of all tiles of all views, except tiles that depend on no parameter."""
     parts = [_view_tiles(view, space, point) for view in views]
     slope, curvature = (np.concatenate([np.asarray(part[i], np.float64) for part in parts]) for i in (0, 1))
     says = np.trace(curvature, axis1=1, axis2=2) > 0.0

@@ -1,8 +1,8 @@
-"""What a frame costs on the machine at hand, pass by pass: measured once, and kept.
+"""Frame time on this machine, pass by pass: measured once, then cached.
 
-Every pass costs a fixed time and a time for each VPL. Which of the choices a pass depends on is known: the
-RSM's resolution moves the passes that read it, interleaving and map size those that gather. So each choice
-is measured along its own axis, at two VPL counts, and any combination is put together from these.
+A pass takes a fixed time plus a time for each VPL. It is known which settings a pass depends on: the RSM
+resolution changes the passes that read the RSM; interleaving and map size change the gather. So each setting
+is timed alone, at two VPL counts, and the time of any combination is composed from these.
 """
 
 import hashlib
@@ -24,41 +24,48 @@ from vpltune.tuner.reference.cache import cache_folder
 from vpltune.tuner.reference.content_key import scene_digest
 
 COUNTS = (32, 256)
-"""VPLs at which each choice is timed."""
+"""VPL counts at which each setting is timed. A choice."""
 FRAMES = 5
-"""Timed at each, of which the median counts."""
+"""Frames timed at each VPL count, of which the median is taken. A choice."""
 INTERLEAVES = (1, 2, 4)
+"""Values of `Quality.interleave` to choose from. A choice; the first one is the default."""
 MAP_SIZES = (8, 16, 24)
+"""Values of `Quality.map_size` to choose from. A choice."""
 RSM_DIVISORS = (1, 2, 4)
+"""The runtime's own RSM resolution over these gives the ones to choose from. A choice."""
 
 _RSM_PASSES = frozenset(
     {"reflective_shadow_map", "vpl_importance", "virtual_point_lights", "clustered_discs"}
 )
 _GATHER_PASSES = frozenset({"vpl_gather", "interleaved_filter"})
 _FORMAT = 4
+"""Version of the cached files; it is part of their keys."""
 
 
 @dataclass(frozen=True)
 class PassCost:
-    """Milliseconds of a pass: `fixed` + `per_vpl` · N."""
+    """Time of a pass with N VPLs: `fixed` + `per_vpl` · N, in milliseconds."""
 
     fixed: float
     per_vpl: float
 
 
 Costs = dict[str, PassCost]
+"""Cost of each pass, by name."""
 
 
 @dataclass(frozen=True)
 class CostModel:
-    """Pass costs along each axis, the other choices being the first of theirs."""
+    """Costs of the passes by the value of one setting, while the other settings are those of
+    `default_choice`."""
 
     interleave: dict[int, Costs]
     map_size: dict[int, Costs]
+    """Empty if VPLs have no visibility maps."""
     rsm_resolution: dict[int, Costs]
 
     def costs(self, choice: Quality) -> Costs:
-        """Every pass of a frame so drawn."""
+        """Costs of all passes of a frame with these settings; `choice.rsm_resolution` must not be None."""
         gathered = self.interleave[choice.interleave]
         mapped = self.map_size.get(choice.map_size, {})
         assert choice.rsm_resolution is not None, "a choice spells its RSM resolution out"
@@ -75,7 +82,7 @@ class CostModel:
         return combined
 
     def scaled(self, factor: float) -> "CostModel":
-        """Of a machine on which everything takes `factor` times as long."""
+        """The model of a machine on which every pass takes `factor` times as long."""
         axes = {axis.name: getattr(self, axis.name) for axis in fields(self)}
         return CostModel(
             **{
@@ -85,17 +92,17 @@ class CostModel:
         )
 
     def milliseconds(self, choice: Quality, count: int) -> float:
-        """Of a whole frame with `count` VPLs."""
+        """Time of a whole frame with `count` VPLs [ms]."""
         return sum(cost.fixed + cost.per_vpl * count for cost in self.costs(choice).values())
 
     def count_within(self, choice: Quality, milliseconds: float) -> float:
-        """How many VPLs a frame can have in that time; below 1, none."""
+        """The number of VPLs that a frame of this time can have; below 1 if it can have none."""
         costs = self.costs(choice).values()
         return (milliseconds - sum(cost.fixed for cost in costs)) / self.per_vpl(choice)
 
     def per_vpl(self, choice: Quality) -> float:
-        """Milliseconds for each VPL more."""
-        # 1e-6: no timer sees less, and noise may make a slope vanish.
+        """Time that each further VPL adds to a frame [ms], at least 1e-6."""
+        # Noise may make the slope vanish; 1e-6 ms is below what a timer resolves.
         return max(sum(cost.per_vpl for cost in self.costs(choice).values()), 1e-6)
 
     def _base(self, name: str) -> PassCost:
@@ -109,9 +116,17 @@ def measured_cost_model(
     runtime: Runtime,
     progress: Callable[[float], None] | None = None,
 ) -> CostModel:
-    """The cost of a frame that shows the slowest of `views`, from the cache or measured now.
+    """The cost model of the slowest of `views`, from the cache or measured now.
 
-    `config` says how VPLs are occluded, and whether there is importance and a near field to pay for.
+    Args:
+        scene: identifies the cached model.
+        views: views at the size that is timed.
+        config: visibility, and whether importance and the near field are drawn; its VPL count is ignored.
+        runtime: draws `scene`.
+        progress: called with the share of the measurements done, in [0, 1].
+
+    Raises:
+        MachineError: the GPU ran out of memory or reported an error.
     """
     key = costs_key(runtime.opengl_renderer, scene, views, config)
     path = cache_folder() / "costs" / f"{key}.json"
@@ -143,7 +158,7 @@ def measured_cost_model(
 
 
 def costs_key(renderer: str, scene: Scene, views: Sequence[View], config: TunedConfig) -> str:
-    """Hash of all that a frame's costs depend on."""
+    """Hash of everything that the cost model depends on, the name of the OpenGL renderer included."""
     parts = [_FORMAT, renderer, shaders_digest(), scene_digest(scene), config.visibility]
     parts += [config.parameters.density_importance > 0.0, config.parameters.screen_space_strength > 0.0]
     parts += [config.parameters.lloyd_iterations]
@@ -157,12 +172,12 @@ def costs_key(renderer: str, scene: Scene, views: Sequence[View], config: TunedC
 
 
 def default_choice(view: View) -> Quality:
-    """The default quality, with its RSM resolution spelled out."""
+    """The default quality, with the RSM resolution that the runtime would pick for this view."""
     return Quality(rsm_resolution=rsm_resolution(view.lights))
 
 
 def rsm_resolutions(view: View) -> tuple[int, ...]:
-    """RSM resolutions to choose from, the runtime's own first."""
+    """RSM resolutions to choose from, in texels; the first is the one that the runtime picks."""
     return tuple(rsm_resolution(view.lights) // divisor for divisor in RSM_DIVISORS)
 
 
@@ -176,7 +191,7 @@ def _scaled(cost: PassCost, other: PassCost, base: PassCost) -> PassCost:
 
 
 def _measure(runtime: Runtime, views: Sequence[View], config: TunedConfig) -> Costs:
-    """The slowest view's passes at both counts, as lines through them."""
+    """Time the slowest view at both VPL counts, and put a line through the two times of each pass."""
     at_count = []
     for count in COUNTS:
         counted = config.with_parameters(replace(config.parameters, vpl_count=count))
@@ -186,7 +201,7 @@ def _measure(runtime: Runtime, views: Sequence[View], config: TunedConfig) -> Co
     costs = {}
     for name in high:
         slope = max(0.0, (high[name] - low.get(name, 0.0)) / (COUNTS[1] - COUNTS[0]))
-        # Noise may make a pass dearer with fewer VPLs: then all of it is fixed.
+        # Noise may make a pass slower with fewer VPLs; then its whole time counts as fixed.
         costs[name] = PassCost(max(0.0, high[name] - slope * COUNTS[1]), slope)
     return costs
 
@@ -195,7 +210,7 @@ def _write(path: Path, model: CostModel) -> None:
     try:
         write_text_whole(path, json.dumps(asdict(model), indent=1) + "\n")
     except InputError:
-        return  # a folder that cannot be written to: measured anew next time
+        return  # the cache cannot be written to: the model is measured again next time
 
 
 def _read(path: Path) -> CostModel | None:

@@ -1,4 +1,4 @@
-"""Fits a scene to a frame's time, or to the whole front of error against time, and writes its files."""
+"""Fits a scene to a frame-time budget, or fits and writes a Pareto front of error against frame time."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -19,20 +19,22 @@ _CHOICES = ("interleave", "map_size", "rsm_resolution")
 
 @dataclass(frozen=True)
 class BudgetOptions:
-    """A frame's time, or the front of error against time, or both.
+    """A frame-time budget, a Pareto front of error against frame time, or both.
 
     Raises:
-        ValueError: neither is asked for, or the time is not a positive number.
+        ValueError: there is neither, or the budget is not a positive finite number.
     """
 
     milliseconds: float | None
+    """The frame-time budget; None asks for the front only."""
     pareto: bool = False
+    """Whether to fit a front."""
     frame_size: tuple[int, int] | None = None
-    """Of the frames that are timed; None takes the views' own."""
+    """Width and height of the timed frames, in pixels; None takes the size of the views."""
 
     def __post_init__(self) -> None:
         if self.milliseconds is None and not self.pareto:
-            raise ValueError("milliseconds: must be given where no front is asked for, got None")
+            raise ValueError("milliseconds: must be given unless pareto is True, got None")
         if self.milliseconds is not None and not 0.0 < self.milliseconds < math.inf:
             raise ValueError(f"milliseconds: must be positive and finite, got {self.milliseconds!r}")
 
@@ -46,13 +48,23 @@ def fit_to_budget(
     seed: int = 0,
     progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[TunedConfig, Descent, dict[str, Any]]:
-    """The config that meets a budget, and the keys `budget` and `pareto` of metrics.json.
+    """Fit a scene to a frame-time budget.
 
-    A front's configs, table and plot are written into `output`; where no time is asked for, the front's most
-    exact point is what is returned.
+    Args:
+        prepared: the scene; at least one of its fitted views is lit.
+        start: where the fit begins; has no prior.
+        options: budget, front and frame size.
+        output: folder that a front's configs, table and plot are written to.
+        seed: selects pixels and rotations.
+        progress: called with the share done, in [0, 1].
+
+    Returns:
+        The config that meets the budget, or without one the point of the front with the least error; its
+        descent; and the keys `budget` and `pareto` of metrics.json.
 
     Raises:
-        InputError: no frame is as fast as asked for.
+        InputError: no frame is as fast as the budget, or `output` cannot be written to.
+        MachineError: the GPU ran out of memory or reported an error.
     """
     size = options.frame_size or prepared.views[0].view.size
     budget = FrameBudget(prepared, start, size, seed=seed, progress=lambda share: progress(0.1 * share))
@@ -75,9 +87,12 @@ def fit_to_budget(
 def write_front(
     output: Path, points: Sequence[BudgetFit], start: TunedConfig, frame_size: tuple[int, int]
 ) -> list[dict[str, Any]]:
-    """Write pareto/<n>.json, pareto.csv and pareto.png into `output`; returns `pareto` of metrics.json.
+    """Write pareto/<n>.json, pareto.csv and pareto.png to `output`; return the key `pareto` of metrics.json.
 
-    Configs of an earlier front are removed: it may have had more points.
+    Configs of an earlier front, which may have more points, are removed.
+
+    Raises:
+        InputError: `output` cannot be written to.
     """
     for earlier in output.glob("pareto/[0-9]*.json"):
         earlier.unlink()
@@ -98,8 +113,12 @@ def write_front(
 
 
 def write_plot(path: Path, points: Sequence[BudgetFit]) -> None:
-    """Error against milliseconds, both logarithmic, each point with its VPL count."""
-    # Here: a plot is asked for seldom, and matplotlib takes half a second to load.
+    """Plot error against frame time on logarithmic axes, each point with its VPL count.
+
+    Raises:
+        InputError: the path cannot be written to.
+    """
+    # Imported here, because matplotlib takes half a second to load and few fits plot.
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 4.0), layout="constrained")

@@ -1,4 +1,4 @@
-"""The best image within a frame's time: from the cost model, then settled and verified in the runtime."""
+"""Finds the best image within a frame-time budget: predicts by the cost model, then times the runtime."""
 
 import hashlib
 import importlib.metadata
@@ -40,63 +40,73 @@ from vpltune.tuner.frame_time.cost_model import (
 )
 
 AIM = 0.97
-"""Of the budget: what a frame is settled at, so that noise does not carry it over."""
+"""Share of the budget that the frame time is set to; the rest absorbs timing noise. A choice."""
 LEAST, MOST = 0.93, 1.0
-"""Of the budget, between which a settled frame is left as it is."""
+"""Shares of the budget between which a measured frame time is accepted. A choice."""
 OVER = 1.05
-"""Of the budget, above which no frame may stay."""
+"""Share of the budget above which a frame is never accepted, not even after all tries. A choice."""
 TRIES = 10
+"""Most VPL counts that are timed to meet a budget. A choice."""
 FRAMES, MOST_FRAMES = 3, 100
-"""Timed each time, of which the median counts: as many as fill `TIMED` in this range."""
+"""Least and most frames of a timing, of which the median is taken. A choice."""
 TIMED = 500.0
-"""Milliseconds: a machine that does other things beside is seldom as busy for less."""
+"""Milliseconds of frames in the final timings, within the limits above. A choice: other load on the machine
+seldom lasts less."""
 LEVEL_FRAMES = 15
-"""Timed at each of two counts, to tell how fast the machine is beside its cost model."""
+"""Frames timed at each VPL count to scale the cost model to the machine's present speed. A choice."""
 SHADOW_SHARE = 0.25
-"""Of the budget, which RSM and placement may take at most before the RSM is made coarser. With a half, more
-time went to a finer RSM alone, and the indirect light was worse than with less."""
+"""Share of the budget that RSM and VPL placement may take before a coarser RSM is used. A choice: with a
+half, more time went to a finer RSM alone, and the indirect light was worse than with less."""
 LEAST_COUNT = 4
-"""VPLs for each pixel of a block, below which a budget is called too small."""
+"""VPLs for each pixel of a block, below which a budget counts as too small. A choice."""
 CHOICE_ROTATIONS = 3
+"""Rotations of the point table that the quality settings are compared on. A choice."""
 GUESSED_IMPORTANCE = 0.75
-"""η while the count is not yet known: what it costs does not depend on its value."""
+"""η until it is fitted. A choice: the cost of importance does not depend on η."""
 _CHOSEN, _FITTED = 0.25, 0.9
-"""Of a fit's work: done once the choice is made, and once density and falloff are fitted."""
+"""Progress after the quality settings are chosen, and after density and falloff are fitted."""
 
 Progress = Callable[[float], None]
+"""Called with the share of the work done, in [0, 1]."""
 
 
 @dataclass(frozen=True)
 class SettledFrame:
-    """A VPL count whose measured frame fits the budget."""
+    """Quality settings and a VPL count whose measured frame time meets the budget."""
 
     choice: Quality
     vpl_count: int
     milliseconds: float
+    """Measured frame time."""
     tries: int
+    """Timings that it took."""
 
 
 @dataclass(frozen=True, eq=False)
 class BudgetFit:
-    """What was chosen for a budget, and how it measured."""
+    """The fit for one budget."""
 
     budget: float
+    """Milliseconds."""
     frame: SettledFrame
     predicted: float
+    """Frame time by the cost model [ms]."""
     parameters: ArtistParameters
     descent: Descent
     relmse: float
     """Mean relMSE of the drawn images over fitted views and held-out rotations."""
     frame_size: tuple[int, int]
+    """Width and height of the timed frames, in pixels."""
     machine: str
+    """Name of the OpenGL renderer."""
 
     def config(self, start: TunedConfig) -> TunedConfig:
-        """`start` with what was found, which draws the images that were measured."""
+        """`start` with the fitted parameters and quality; it draws the frames that were measured."""
         met = MetBudget(self.budget, self.frame_size, self.machine)
         return replace(start.with_parameters(self.parameters), quality=replace(self.frame.choice, budget=met))
 
     def document(self) -> dict[str, Any]:
-        """What metrics.json says of it."""
+        """The key `budget` of metrics.json, and the entries of `pareto`."""
         return {
             "budget_milliseconds": self.budget,
             "milliseconds": self.frame.milliseconds,
@@ -109,9 +119,19 @@ class BudgetFit:
 
 
 class FrameBudget:
-    """Fits a prepared scene, some view of which is lit, to budgets of frames of one size.
+    """Fits a prepared scene to frame-time budgets at one frame size.
 
-    The slowest of the fitted views counts. Raises MachineError as `Runtime`.
+    The frame time is that of the slowest fitted view.
+
+    Args:
+        prepared: the scene; at least one of its fitted views is lit.
+        start: where fits begin; has no prior.
+        frame_size: width and height of the timed frames, in pixels.
+        seed: selects pixels and rotations.
+        progress: called with the share of the cost model measured, in [0, 1].
+
+    Raises:
+        MachineError: the GPU ran out of memory or reported an error.
     """
 
     def __init__(
@@ -126,7 +146,7 @@ class FrameBudget:
         self._prepared = prepared
         self._seed = seed
         fitted = [view for view in prepared.views if view.view.split == "fitted"]
-        # A view that no light reaches says nothing of errors, and takes its time all the same.
+        # An unlit view has no error to measure, but it takes time to draw.
         self._views = tuple(view for view in fitted if view.lit)
         self._timed = tuple(replace(view.view, size=frame_size) for view in fitted)
         guessed = replace(with_discs(start.parameters), density_importance=GUESSED_IMPORTANCE)
@@ -137,24 +157,24 @@ class FrameBudget:
         self.costs: CostModel = measured.scaled(self._level(measured))
 
     def least_milliseconds(self) -> float:
-        """The least budget: of the cheapest frame in which every pixel has any VPLs to speak of."""
+        """The least budget [ms]: the fastest settings, with `LEAST_COUNT` VPLs for each pixel of a block."""
         return min(
             self.costs.milliseconds(choice, LEAST_COUNT * choice.interleave**2) / AIM
             for choice in self._choices(0.0)
         )
 
     def fit(self, budget: float, progress: Progress | None = None) -> BudgetFit:
-        """The best found within `budget` milliseconds.
+        """Find the settings and parameters with the least error within `budget` milliseconds.
 
         Raises:
-            InputError: no frame is as fast as that, or none was when it was measured.
+            InputError: no settings are predicted to be that fast, or none were when measured.
         """
         report = progress or (lambda share: None)
         choice = self._best_choice(budget, lambda share: report(_CHOSEN * share))
         frame = self._settle(choice, budget)
         start = replace(self._start.parameters, vpl_count=frame.vpl_count)
         fit = self._fitted(choice, start, lambda share: report(_CHOSEN + (_FITTED - _CHOSEN) * share))
-        # Without importance a frame is cheaper, and the falloff does not change what it costs.
+        # Settle again: with η = 0 a frame is faster. The falloff does not change the frame time.
         settled = self._settle(choice, budget, fit.parameters)
         parameters = replace(fit.parameters, vpl_count=settled.vpl_count)
         if abs(settled.vpl_count - frame.vpl_count) > 0.1 * frame.vpl_count:
@@ -176,7 +196,7 @@ class FrameBudget:
         )
 
     def content_key(self) -> str:
-        """Of all that fits depend on, but for how fast the machine is at the moment."""
+        """Hash of everything that fits depend on, except the machine's present speed."""
         renderer = self._prepared.runtime.opengl_renderer
         parts = [
             costs_key(renderer, self._prepared.scene, self._timed, self._start),
@@ -192,13 +212,13 @@ class FrameBudget:
         return digest.hexdigest()
 
     def milliseconds(self, choice: Quality, parameters: ArtistParameters, frames: int = FRAMES) -> float:
-        """Frame time of the slowest view, as it measures now."""
+        """Frame time of the slowest view, measured now: the median of `frames` frames."""
         config = self._config(choice, parameters)
         return max(self._runtime.frame_milliseconds(view, config, frames) for view in self._timed)
 
     def _level(self, costs: CostModel) -> float:
-        """How much longer frames take than the model says: passes overlap in them, and a model is kept longer
-        than a machine is as busy as it was."""
+        """Measured frame time over the model's prediction. Passes overlap in a frame, and the machine's load
+        may have changed since the model was cached."""
         choice = self.default_choice
         measured = sum(
             self.milliseconds(choice, replace(self._start.parameters, vpl_count=count), LEVEL_FRAMES)
@@ -207,7 +227,7 @@ class FrameBudget:
         return measured / sum(costs.milliseconds(choice, count) for count in COUNTS)
 
     def _choices(self, budget: float) -> list[Quality]:
-        """All ways to gather, with the finest RSM that leaves enough of the budget."""
+        """All combinations of interleaving and map size, with the finest RSM within `SHADOW_SHARE`."""
         given = self._start.quality
         maps = MAP_SIZES if self._start.visibility == "maps" else (given.map_size,)
         resolutions = rsm_resolutions(self._timed[0])
@@ -227,7 +247,8 @@ class FrameBudget:
         return sum(costs[name].fixed for name in names if name in costs)
 
     def _best_choice(self, budget: float, progress: Progress) -> Quality:
-        """Least error of the start's own parameters, each choice with the VPLs that it can pay for."""
+        """The settings with which the start's parameters have the least error, at the VPL count that the
+        budget allows."""
         rotations = table_rotations(CHOICE_ROTATIONS, self._seed)
         errors = {}
         choices = self._choices(budget)
@@ -235,7 +256,7 @@ class FrameBudget:
             progress(index / len(choices))
             count = min(self.costs.count_within(choice, AIM * budget), parameter_spec("vpl_count").high)
             if count < LEAST_COUNT * choice.interleave**2:
-                continue  # every pixel of a block needs VPLs of its own
+                continue  # each pixel of a block needs VPLs of its own
             parameters = replace(self._start.parameters, vpl_count=int(count))
             config = self._config(choice, parameters)
             errors[choice] = rotation_errors(self._runtime, self._views, config, rotations).mean()
@@ -249,9 +270,13 @@ class FrameBudget:
     def _settle(
         self, choice: Quality, budget: float, parameters: ArtistParameters | None = None
     ) -> SettledFrame:
-        """Change the count until the measured frame fits: the slope is the model's, its level measured.
+        """Adjust the VPL count until the measured frame time meets the budget.
 
-        With the parameters that it will have, it must fit twice: of many tries one would pass by luck.
+        With the final `parameters`, a count must meet it in two timings: of many tries, one would pass by
+        chance. If no count is accepted in `TRIES` timings, the largest one within `OVER` is returned.
+
+        Raises:
+            InputError: no timing was within `OVER` of the budget.
         """
         chosen = self._start.parameters if parameters is None else parameters
         least, most = LEAST_COUNT * choice.interleave**2, int(parameter_spec("vpl_count").high)
@@ -264,7 +289,7 @@ class FrameBudget:
             count = int(np.clip(round(wanted), least, most))
             taken = self.milliseconds(choice, replace(chosen, vpl_count=count), frames)
             confirmed = count in measured
-            # A count that is asked for again has been timed on a quieter or busier machine: both count.
+            # The machine's load changes: average the two timings of a count.
             measured[count] = 0.5 * (taken + measured[count]) if confirmed else taken
             if not LEAST * budget <= measured[count] <= MOST * budget:
                 slope = _slope(measured, slope)
@@ -281,7 +306,7 @@ class FrameBudget:
         return SettledFrame(choice, best, fitting[best], TRIES)
 
     def _fitted(self, choice: Quality, start: ArtistParameters, progress: Progress | None) -> DensityFit:
-        # The more VPLs, the less does one placement differ from another: the work is that of few.
+        # With more VPLs, rotations differ less, so fewer are needed: the work stays that of `FEW_VPLS`.
         rotations = int(np.clip(ROTATIONS * FEW_VPLS // start.vpl_count, 2, ROTATIONS))
         return fit_density(
             self._runtime,
@@ -304,7 +329,7 @@ class FrameBudget:
 
 
 def _slope(measured: dict[int, float], model: float) -> float:
-    """Milliseconds for each VPL: between the extreme counts that were measured, held near the model's."""
+    """Milliseconds per VPL between the extreme measured counts, limited to 0.3 to 3 times the model's."""
     low, high = min(measured), max(measured)
     if high < 1.2 * low:
         return model

@@ -1,8 +1,7 @@
-"""The front of error against a frame's time: fits over the range of useful budgets, timed in turns.
+"""The Pareto front of error against frame time: fits over the range of useful budgets.
 
-A point costs a whole fit, so each is kept in the user's cache as it is made: a front that was interrupted
-goes on with the budgets that it began with. One that is done is forgotten there: who asks again wants it
-measured anew.
+A point takes a whole fit, so each is saved in the user's cache as soon as it is done, and an interrupted
+front resumes with its budgets. A finished front is removed from the cache, so the next run measures it again.
 """
 
 import json
@@ -23,17 +22,20 @@ from vpltune.tuner.frame_time.frame_budget import BudgetFit, FrameBudget, Progre
 from vpltune.tuner.reference.cache import cache_folder
 
 POINTS = 6
+"""Number of budgets. A choice."""
 DENSEST = 512
-"""VPLs of the default frame, whose time the front goes up to: more of them hardly change the error."""
+"""The largest budget is the time of a default frame with this many VPLs. A choice: more of them hardly change
+the error."""
 TURNS, FRAMES_A_TURN = 3, 3
-"""Points are timed in turns, so that a machine that is busier for a while is so for all of them."""
+"""Rounds in which all points are timed, and frames of each timing. A choice: a temporary load on the machine
+then affects all points alike."""
 
 
 def fit_front(budget: FrameBudget, progress: Progress | None = None) -> tuple[BudgetFit, ...]:
-    """Fits whose error falls as their time rises: what another beats in both is left out.
+    """Fit all budgets, and return the Pareto front by rising frame time.
 
     Raises:
-        InputError: not one budget could be met when it was measured.
+        InputError: no budget could be met.
     """
     kept = _KeptFits(budget)
     points: list[BudgetFit] = []
@@ -50,7 +52,7 @@ def fit_front(budget: FrameBudget, progress: Progress | None = None) -> tuple[Bu
         try:
             kept.add((budget.fit(milliseconds, report),))
         except InputError:
-            # The cheapest frame did not measure as predicted: the front starts later.
+            # The frame was slower than predicted: leave this budget out.
             if not points and milliseconds == kept.budgets[-1]:
                 raise
             kept.add(())
@@ -61,7 +63,7 @@ def fit_front(budget: FrameBudget, progress: Progress | None = None) -> tuple[Bu
 
 
 def pareto_front(points: Sequence[BudgetFit]) -> tuple[BudgetFit, ...]:
-    """Those that no other beats in both time and error, by rising time."""
+    """The fits that no other beats in both frame time and error, by rising frame time."""
     front: list[BudgetFit] = []
     for point in sorted(points, key=lambda point: (point.frame.milliseconds, point.relmse)):
         if not front or point.relmse < front[-1].relmse:
@@ -70,7 +72,7 @@ def pareto_front(points: Sequence[BudgetFit]) -> tuple[BudgetFit, ...]:
 
 
 def _timed_in_turns(budget: FrameBudget, points: Sequence[BudgetFit]) -> list[BudgetFit]:
-    """The same with the times that they have beside each other."""
+    """The same fits with new frame times: medians over rounds in which all are timed."""
     taken: list[list[float]] = [[] for _ in points]
     for _ in range(TURNS):
         for times, point in zip(taken, points, strict=True):
@@ -88,7 +90,7 @@ def _budgets(budget: FrameBudget) -> list[float]:
 
 
 class _KeptFits:
-    """What of a front is done: its budgets, and for the first of them a fit, or none where it was not met."""
+    """The saved state of a front: its budgets, and for each finished one a fit, or none if it was not met."""
 
     def __init__(self, budget: FrameBudget):
         self._path: Path = cache_folder() / "fronts" / f"{budget.content_key()}.json"
@@ -98,11 +100,11 @@ class _KeptFits:
             self.budgets = [float(each) for each in document["budgets"]]
             self.fits = [tuple(_read_fit(each) for each in fits) for fits in document["fits"]]
         except (OSError, ValueError, TypeError, KeyError, AttributeError):
-            # None was interrupted, or its file is damaged.
+            # No front was interrupted, or its file is damaged.
             self.budgets, self.fits = _budgets(budget), []
 
     def add(self, fits: tuple[BudgetFit, ...]) -> None:
-        """The next budget's."""
+        """Save the result of the next budget."""
         self.fits.append(fits)
         document = {
             "budgets": self.budgets,
@@ -111,10 +113,10 @@ class _KeptFits:
         try:
             write_text_whole(self._path, json.dumps(document) + "\n")
         except InputError:
-            return  # a folder that cannot be written to: an interrupted front begins anew
+            return  # the cache cannot be written to: an interrupted front starts over
 
     def forget(self) -> None:
-        """The front is done."""
+        """Remove the saved state."""
         self._path.unlink(missing_ok=True)
 
 

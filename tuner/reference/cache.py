@@ -50,6 +50,7 @@ def load(key: str) -> ReferenceView | None:
         return None
     with contextlib.suppress(OSError):
         os.utime(path)
+    _log.debug("reference read from %s", path)
     with np.load(io.BytesIO(payload), allow_pickle=False) as arrays:
         found = {name: arrays[name] for name in arrays.files}
     return ReferenceView(**{name: a if a.ndim else a.item() for name, a in found.items()})
@@ -71,6 +72,7 @@ def store(key: str, reference: ReferenceView) -> None:
             leftover.unlink(missing_ok=True)
         with written_whole(path) as temporary:
             temporary.write_bytes(_digest(key, payload) + payload)
+        _log.debug("reference kept in %s", path)
         _stored_bytes += len(payload)
         if _stored_bytes > LOOK_SHARE * SIZE_LIMIT:
             _stored_bytes = 0

@@ -13,6 +13,7 @@ import functools
 import hashlib
 import importlib.metadata
 import json
+import logging
 import os
 import platform
 import re
@@ -25,6 +26,8 @@ from typing import Literal
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.tuner.reference.cache import cache_folder, locked
+
+_log = logging.getLogger(__name__)
 
 LIBRARIES_TRIED = 4
 """LLVM libraries to try at most. A choice: each failed trial costs a start of Python and Mitsuba."""
@@ -77,6 +80,7 @@ def select_variant() -> MitsubaVariant:
 
     if mitsuba.variant() != variant.name:
         mitsuba.set_variant(variant.name)
+        _log.debug("%s", variant.sentence)
         threads = os.environ.get("VPLTUNE_THREADS", "")
         if threads.isdecimal() and int(threads) > 0:
             import drjit

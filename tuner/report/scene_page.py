@@ -18,7 +18,7 @@ SPLITS = {"fitted": "fitted views, mean", "held_out": "held-out views, mean"}
 FIGURES = {
     "relmse": "relMSE",
     "trimmed_relmse": "without worst 0.1 %",
-    "worst_share": "their share",
+    "worst_share": "share of worst",
     "median_error": "median pixel",
     "energy_ratio": "energy",
     "flip": "FLIP",

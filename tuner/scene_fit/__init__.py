@@ -1,1 +1,1 @@
-"""The fit of one scene, from its views to the files it writes."""
+"""The fit of one scene, from its views to the files that it writes."""

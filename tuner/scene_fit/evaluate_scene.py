@@ -1,4 +1,4 @@
-"""Measures a config on a scene: default, tuned and ceiling against the reference."""
+"""`vpltune evaluate`: measures a config on a scene, as default, tuned and ceiling against the reference."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,14 +16,18 @@ from vpltune.tuner.scene_fit.fit_scene import default_like
 
 @dataclass(frozen=True, eq=False)
 class EvaluateOptions(SceneOptions):
-    """`tuned`: the config to measure. `views_path`: the file that `fixed_views` were read from."""
+    """What to measure, and in which views."""
 
     tuned: TunedConfig = field(default_factory=TunedConfig)
+    """The config to measure."""
     views_path: Path | None = None
+    """The file that `fixed_views` were read from; None writes the views to the user's cache."""
 
 
 @dataclass(frozen=True, eq=False)
 class SceneEvaluation:
+    """The result of `evaluate_scene`."""
+
     evaluation: Evaluation
     document: dict[str, Any]
     """What `vpltune evaluate --json` prints."""
@@ -32,9 +36,14 @@ class SceneEvaluation:
 def evaluate_scene(scene_path: Path, options: EvaluateOptions, progress: Progress) -> SceneEvaluation:
     """Measure a config on a scene's fitted and held-out views.
 
+    Args:
+        scene_path: a scene file.
+        options: the config and the views.
+        progress: called with the name of a stage and the share of it that is done, in [0, 1].
+
     Raises:
         InputError: the scene or its sidecar cannot be used.
-        MachineError: no OpenGL.
+        MachineError: there is no OpenGL 4.5, or the GPU ran out of memory.
     """
     watch = Stopwatch()
     prepared = prepare_scene(scene_path, options, options.tuned, watch, progress)
@@ -59,7 +68,7 @@ def evaluate_scene(scene_path: Path, options: EvaluateOptions, progress: Progres
             )
     views_path = options.views_path
     if views_path is None:
-        # A report that names its views must name a file that others can read.
+        # The document names a views file, so there has to be one.
         views_path = cache_folder() / "views" / f"{scene_digest(prepared.scene)[:16]}-{options.seed}.json"
         write_views(views_path, str(scene_path), tuple(view.view for view in prepared.views))
     document = {

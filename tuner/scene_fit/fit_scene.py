@@ -1,4 +1,4 @@
-"""Job one: a scene in, a tuned config and the proof of it out."""
+"""`vpltune fit`: fits a scene, judges the result on validation views, and writes config and metrics."""
 
 import importlib.metadata
 import platform
@@ -41,37 +41,39 @@ from vpltune.tuner.scene_fit.fit_search import Search, search
 from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
 
 VALIDATION_ROTATIONS = 4
-"""Rotations of the point table in each validation view with few VPLs: a single placement is mostly luck."""
+"""Rotations of the point table in each validation view, with few VPLs. A choice: the error of one rotation is
+mostly chance."""
 
 
 @dataclass(frozen=True, eq=False)
 class FitOptions(SceneOptions):
-    """`start`: where the fit begins, and what the parameters that are not fitted stay at.
-
-    density: fit to several rotations of the point table, and where the VPLs stand with it.
-    budget: fit to a frame's time, the count and how the frame is drawn with it; see `tuner.frame_time.fit_budget`.
-    motion: whether the result must also be as steady as the start while lights move.
-    command: what was typed, for the record; None where the fit was asked for from Python.
-    """
+    """What to fit, and in which views."""
 
     start: TunedConfig = field(default_factory=TunedConfig)
+    """Where the fit begins, and the values of everything that is not fitted."""
     density: bool = False
+    """Fits the placement density too, over several rotations of the point table: for few VPLs."""
     budget: BudgetOptions | None = None
+    """Picks VPL count and quality settings that meet a frame time (`tuner.frame_time.fit_budget`)."""
     motion: bool = False
+    """Accepts only a result that flickers no more than the start when lights move."""
     command: str | None = None
+    """The command line, for the provenance in metrics.json; None if the fit was called from Python."""
 
 
 @dataclass(frozen=True, eq=False)
 class FitResult:
-    """What `fit_scene` made."""
+    """The result of `fit_scene`."""
 
     config: TunedConfig
+    """The config in tuned.json: the tuned one, or the start if it was kept."""
     status: Outcome
     descent: Descent
     evaluation: Evaluation
     notes: tuple[str, ...]
+    """Remarks for the user, one sentence each."""
     document: dict[str, Any]
-    """What metrics.json holds, and `vpltune fit --json` prints."""
+    """The content of metrics.json, which `vpltune fit --json` prints."""
 
 
 def fit(
@@ -82,14 +84,18 @@ def fit(
     progress: Progress | None = None,
     **options: Any,
 ) -> FitResult:
-    """Fit a scene from Python as `vpltune fit` does; see `fit_scene` for what is written and raised.
+    """Fit a scene from Python, as `vpltune fit` does.
 
     Args:
         scene: a glTF, OBJ or PLY file.
-        output: the folder for tuned.json, views.json, metrics.json, images.npz and comparison.png.
-        config: where the fit starts: a config file, or "default".
-        progress: called with a stage's name and the share of it that is done, in [0, 1].
-        options: fields of `tuner.evaluation.prepare_scene.SceneOptions`: views, seed, bounces, camera, light, size …
+        output: folder for tuned.json, views.json, metrics.json, images.npz and comparison.png.
+        config: where the fit begins: a config file, "default" or "auto".
+        progress: called with the name of a stage and the share of it that is done, in [0, 1].
+        options: fields of `FitOptions`: views, seed, bounces, camera, light, size, density …
+
+    Raises:
+        InputError: the config, the scene, its sidecar or the output folder cannot be used.
+        MachineError: there is no OpenGL 4.5, or the GPU ran out of memory.
 
     Example:
         >>> result = vpltune.fit("configs/scenes/cornell-box.glb", "out/cornell", views=4)
@@ -102,16 +108,23 @@ def fit(
 def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Progress) -> FitResult:
     """Fit a scene; write tuned.json, views.json, metrics.json, images.npz and comparison.png to `output`.
 
-    Every file is written whole, and only once the fit and its measurement are done. References are kept
-    in the user's cache as they are made, so a run that was stopped goes on where it was.
+    No file is written before the fit and its measurement are done, except a front of `options.budget`, and
+    none is ever half written. References are kept in the user's cache as soon as they are rendered, so an
+    interrupted run does not render them again.
+
+    Args:
+        scene_path: a scene file.
+        output: the folder to write to; created if it does not exist.
+        options: what to fit, and in which views.
+        progress: called with the name of a stage and the share of it that is done, in [0, 1].
 
     Raises:
-        InputError: the scene, its sidecar or the output folder cannot be used.
-        MachineError: no OpenGL.
+        InputError: the scene, its sidecar or the output folder cannot be used, or no frame meets the budget.
+        MachineError: there is no OpenGL 4.5, or the GPU ran out of memory.
     """
     watch = Stopwatch()
     if output.exists() and not output.is_dir():
-        raise InputError(f"{output}: the output must be a folder, and is a file")
+        raise InputError(f"{output}: the output must be a folder, got a file")
     prepared = prepare_scene(scene_path, options, options.start, watch, progress, validated=True)
     fitted = [view for view in prepared.views if view.view.split == "fitted"]
     drawn = [view.drawn_with.parameters for view in fitted if view.drawn_with is not None]
@@ -173,21 +186,23 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """How a fit ended, and what it rests on."""
+    """How a fit ended."""
 
     status: Outcome
     sentence: str
     config: TunedConfig
-    """What was found or kept, without provenance."""
+    """The tuned config, or the start if it was kept, without provenance."""
     start: TunedConfig
-    """The start at the cost of what was found: its VPL count and quality are those of `config`."""
+    """The start with the VPL count and quality of `config`, so that both cost the same."""
     descent: Descent
     known: dict[str, Any] = field(default_factory=dict)
+    """`tuner.fitting.uncertainty.Interval` by parameter."""
     verdict: Verdict | None = None
     captured: tuple[CapturedView, ...] = ()
-    """Fitted views captured with the placement that the search ended at."""
+    """The lit fitted views, captured with the placement that the search found."""
     notes: tuple[str, ...] = ()
     document: dict[str, Any] = field(default_factory=dict)
+    """Further keys of metrics.json."""
 
 
 def _unlit(start: TunedConfig) -> _Found:
@@ -204,7 +219,7 @@ def _judged(
     watch: Stopwatch,
     progress: Progress,
 ) -> _Found:
-    """Search on the fitted views, and choose on the validation views."""
+    """Search on the fitted views, then choose between the candidates on the validation views."""
     with watch.stage("fit"):
         found = search(
             prepared,
@@ -236,14 +251,14 @@ def _judged(
     else:
         assert chosen is not None, "nothing is in doubt, so the candidates were judged"
         status, sentence, parameters = "kept", chosen.sentence, baseline.parameters
-    # An interval says where the fitted views have their optimum; validation may choose a value beside it.
+    # An interval is around the optimum on the fitted views; validation may choose a value outside it.
     known = {
         name: replace(interval, value=float(getattr(parameters, name)))
         for name, interval in found.known.items()
     }
     notes = undetermined(found.known, parameters)
     if found.document.keys() & {"budget", "pareto"} and parameters != found.tuned:
-        notes = (*notes, "the budget's figures are those of what was found, not of the start that is kept")
+        notes = (*notes, "the budget figures are those of the fitted parameters, which were not chosen")
     return _Found(
         status,
         sentence,
@@ -265,10 +280,11 @@ def _validated(
     options: FitOptions,
     progress: Progress,
 ) -> tuple[Verdict | None, tuple[str, ...]]:
-    """What the validation views choose, and what speaks against judging by them."""
+    """The choice on the validation views, None with fewer than two lit ones, and the reasons not to judge by
+    them."""
     auto = _auto_candidate(prepared, start, options)
     tried = candidates(start.parameters, found.base, found.tuned, auto)
-    # The first is what the runtime draws with; the others are not those that a density was fitted to.
+    # The identity, which the runtime draws with, and rotations that the density was not fitted to.
     rotations = table_rotations(VALIDATION_ROTATIONS - 1, options.seed, held_out=True)
     few = options.density or options.budget is not None
     metrics, captured = validation_metrics(
@@ -290,7 +306,7 @@ def _validated(
 
 
 def _prior_metrics(prepared: PreparedScene, start: TunedConfig) -> list[ViewMetrics]:
-    """The start's own, where a prior sets its parameters anew in each validation view."""
+    """Metrics of a start with a prior, which sets the parameters anew in each validation view."""
     runtime = prepared.runtime
     drawn = [
         CapturedView(view, reference, runtime.capture(view, start, maps=False))
@@ -302,9 +318,10 @@ def _prior_metrics(prepared: PreparedScene, start: TunedConfig) -> list[ViewMetr
 def _auto_candidate(
     prepared: PreparedScene, start: TunedConfig, options: FitOptions
 ) -> ArtistParameters | None:
-    """What the shipped prior sets at the start's placement, the mean over the fitted views in the unit cube.
+    """The parameters that the shipped prior sets for the start's placement: the mean over the fitted views.
 
-    None where it was not trained for it: with clustered discs, or without maps.
+    None if the prior was not trained for this start, which has clustered disc lights or no visibility maps,
+    or if the start has a prior itself.
     """
     parameters = start.parameters
     if (
@@ -329,7 +346,7 @@ def _auto_candidate(
 
 
 def _evaluated(prepared: PreparedScene, found: _Found, options: FitOptions, progress: Progress) -> Evaluation:
-    """Default, tuned and ceiling in the fitted and the held-out views."""
+    """Measure default, tuned and ceiling in the fitted and held-out views."""
     tuned = found.config
     known = (*prepared.views, *found.captured)
     views = []
@@ -357,7 +374,7 @@ def _evaluated(prepared: PreparedScene, found: _Found, options: FitOptions, prog
 
 
 def _same_vpls(first: TunedConfig, second: TunedConfig) -> bool:
-    """Whether two configs draw the same VPLs and visibility maps."""
+    """Whether both configs draw the same VPLs and visibility maps."""
     return (
         placement(first.parameters) == placement(second.parameters)
         and first.visibility == second.visibility
@@ -366,12 +383,17 @@ def _same_vpls(first: TunedConfig, second: TunedConfig) -> bool:
 
 
 def fit_start(config: TunedConfig, drawn: Sequence[ArtistParameters]) -> ArtistParameters:
-    """The config's parameters; with a prior, the mean in the unit cube of what views were drawn with."""
+    """The parameters that a fit starts from: the config's, or the mean of those that its prior set.
+
+    Args:
+        config: the start.
+        drawn: parameters that the views were drawn with; at least one if the config has a prior.
+    """
     return config.parameters if config.auto is None else _mean_parameters(config.parameters, drawn)
 
 
 def _mean_parameters(rest: ArtistParameters, drawn: Sequence[ArtistParameters]) -> ArtistParameters:
-    """The mean in the unit cube of what a prior sets; all else from `rest`."""
+    """Mean of the parameters that a prior sets, each on its own scale; all others are those of `rest`."""
     values = {}
     for name in AUTO_PARAMETERS:
         spec = parameter_spec(name)
@@ -380,13 +402,13 @@ def _mean_parameters(rest: ArtistParameters, drawn: Sequence[ArtistParameters]) 
 
 
 def default_like(start: ArtistParameters) -> ArtistParameters:
-    """The defaults with the start's VPL count and screen-space near field, which no fit changes."""
+    """The default parameters, with the start's VPL count and screen-space near field."""
     kept = ("vpl_count", "screen_space_radius", "screen_space_strength")
     return replace(ArtistParameters(), **{name: getattr(start, name) for name in kept})
 
 
 def _keeps_prior(found: _Found, options: FitOptions) -> bool:
-    """Whether the start was kept, and has a prior; a budget's start is what the prior set on average."""
+    """Whether the config keeps the start's prior: the start was kept, and no budget changed it."""
     kept = found.config.draws_as(found.start)
     return kept and options.start.auto is not None and options.budget is None
 

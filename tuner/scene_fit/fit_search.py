@@ -1,4 +1,4 @@
-"""Looks for better parameters on the fitted views; `tuner.evaluation.guard` decides whether they are."""
+"""Searches for parameters on the fitted views; `tuner.evaluation.guard` decides whether they are better."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -22,20 +22,20 @@ from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What a search found."""
+    """The result of a search."""
 
     base: ArtistParameters
-    """The tuned placement with the falloff and visibility that its fit began with."""
+    """The tuned placement with the falloff and visibility that its fit started from."""
     tuned: ArtistParameters
     quality: Quality
-    """The start's, or what meets the budget."""
+    """The start's quality, or the one that meets the budget."""
     descent: Descent
     known: dict[str, Interval]
-    """What is known of each falloff parameter."""
+    """The interval of each falloff parameter; empty if nothing could be fitted."""
     views: tuple[CapturedView, ...]
-    """The fitted views that light reaches, captured with the tuned placement."""
+    """The lit fitted views, captured with the tuned placement."""
     document: dict[str, Any] = field(default_factory=dict)
-    """What metrics.json gains."""
+    """Further keys of metrics.json: `density`, `budget` and `pareto`, or `placements`."""
 
 
 def search(
@@ -48,14 +48,19 @@ def search(
     seed: int,
     progress: Callable[[float], None],
 ) -> Search:
-    """The best that the fitted views know of.
+    """Search for the best parameters on the fitted views.
 
     Args:
-        prepared: some fitted view of it is lit.
-        start: without a prior.
-        output: where a budget's front is written.
-        density: fit to several rotations of the point table, for few VPLs.
-        budget: fit the count and how the frame is drawn to a frame time.
+        prepared: the scene; at least one of its fitted views is lit.
+        start: where the search begins; has no prior.
+        output: folder that a front of `budget` is written to.
+        density: fit the placement density over several rotations of the point table, for few VPLs.
+        budget: pick VPL count and quality settings that meet a frame time; overrides `density`.
+        seed: selects pixels and rotations.
+        progress: called with the share done, in [0, 1].
+
+    Raises:
+        InputError: no frame meets the budget.
     """
     views = tuple(view for view in prepared.views if view.view.split == "fitted" and view.lit)
     if budget is not None:
@@ -109,7 +114,7 @@ def _recaptured(
     found: dict[str, Any],
     seed: int,
 ) -> Search:
-    """A search whose VPLs ended elsewhere than they began: the views once more, and the intervals there."""
+    """Finish a search that moved the VPLs: capture the views again, and compute the intervals there."""
     base = replace(
         start.parameters,
         vpl_count=tuned.vpl_count,
@@ -117,7 +122,7 @@ def _recaptured(
         density_importance=tuned.density_importance,
     )
     if tuned.lloyd_iterations > 0:
-        # Discs begin at α = 1, whatever the start's points had; a start with discs keeps its α.
+        # Discs begin at α = 1 if the start has points; a start with discs keeps its α.
         base = replace(with_discs(base), lloyd_iterations=tuned.lloyd_iterations)
     captured = capture_views(
         prepared.runtime,
@@ -127,7 +132,8 @@ def _recaptured(
     )
     if descent.status.nothing_fitted:
         return Search(base, tuned, start.quality, descent, {}, captured, found)
-    # One rotation a view: several of one view err together, and would count as independent witnesses.
+    # One rotation for each view: errors of several rotations of a view are correlated, and their tiles would
+    # count as independent.
     ready = ready_views(captured, tuned, robust_errors(captured, seed=seed), seed=seed)
     names = frozenset(SearchSpace().names)
     known = open_intervals(ready, tuned, names, base)

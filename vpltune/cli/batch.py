@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 
 RUN_PANEL = "How it is run"
 SCENE_MEMORY_BYTES = 2 * 2**30
-"""That a worker should have: twice what a process that fits takes."""
+"""The memory that each worker should have: twice what a process that fits takes."""
 SLURM_TASKS = 64
-"""Of an array, where `--workers` is not given."""
+"""How many tasks a Slurm array has where `--workers` is not given."""
 MEMORY_UNITS = {"M": 2**20, "G": 2**30}
 
 

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from vpltune.cli.report import one_line
+from vpltune.cli.verbosity import is_quiet, one_line, say
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars
@@ -18,10 +18,13 @@ STAGES = ("load", "reference", "capture", "fit", "evaluate")
 
 
 @contextlib.contextmanager
-def shown_batch(workers: int) -> Iterator["LineDisplay | BarDisplay"]:
+def shown_batch(workers: int) -> Iterator["SilentDisplay | LineDisplay | BarDisplay"]:
     """Whoever watches a batch of so many scenes at a time, until the block ends."""
     from vpltune.tuner.batch.time_to_finish import Forecast
 
+    if is_quiet():
+        yield SilentDisplay()
+        return
     forecast = Forecast(workers)
     if not sys.stderr.isatty():
         yield LineDisplay(forecast)
@@ -41,6 +44,16 @@ def shown_batch(workers: int) -> Iterator["LineDisplay | BarDisplay"]:
         yield BarDisplay(forecast, bars)
 
 
+class SilentDisplay:
+    """Nothing, with `--quiet`."""
+
+    def found(self, jobs: "Sequence[Job]", already_done: int) -> None:
+        """Told once, before anything starts: the scenes to tune, and how many have a record."""
+
+    def happened(self, event: dict[str, Any]) -> None:
+        """Told of each event of the batch's log."""
+
+
 class LineDisplay:
     """Plain lines: what is there to do, and each scene as it ends."""
 
@@ -48,18 +61,20 @@ class LineDisplay:
         self._forecast = forecast
 
     def found(self, jobs: "Sequence[Job]", already_done: int) -> None:
+        """Told once, before anything starts: the scenes to tune, and how many have a record."""
         self._forecast.found(jobs)
         known = f", {already_done} have a record" if already_done else ""
-        _say(f"{len(jobs)} scene{'s' * (len(jobs) != 1)} to tune{known}")
+        say(f"{len(jobs)} scene{'s' * (len(jobs) != 1)} to tune{known}")
 
     def happened(self, event: dict[str, Any]) -> None:
+        """Told of each event of the batch's log."""
         self._forecast.happened(event, time.monotonic())
         line = ending(event)
         if line and event["event"] == "record":
             done, left = self._forecast.done, time_left(self._forecast)
-            _say(f"[{done}/{self._forecast.total}] {line}{left}")
+            say(f"[{done}/{self._forecast.total}] {line}{left}")
         elif line:
-            _say(line)
+            say(line)
 
 
 class BarDisplay:
@@ -71,12 +86,14 @@ class BarDisplay:
         self._scenes: dict[str, Any] = {}
 
     def found(self, jobs: "Sequence[Job]", already_done: int) -> None:
+        """Told once, before anything starts: the scenes to tune, and how many have a record."""
         self._forecast.found(jobs)
         self._already_done = already_done
         self._whole = self._bars.add_task("scenes", total=len(jobs) + already_done, note="")
         self._bars.update(self._whole, completed=already_done)
 
     def happened(self, event: dict[str, Any]) -> None:
+        """Told of each event of the batch's log."""
         self._forecast.happened(event, time.monotonic())
         key = event.get("key", "")
         if event["event"] == "scene_started":
@@ -115,7 +132,3 @@ def time_left(forecast: "Forecast") -> str:
     unit, seconds = next(((u, s) for u, s in (("h", 3600), ("min", 60)) if high >= 2 * s), ("s", 1))
     first, last = round(low / seconds), max(1, round(high / seconds))
     return f"; {f'{first} to ' if first != last else ''}{last} {unit} left"
-
-
-def _say(text: str) -> None:
-    print(f"vpltune: {text}", file=sys.stderr, flush=True)

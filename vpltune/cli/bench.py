@@ -18,6 +18,8 @@ def bench(
         from benchmarks import benchmark_names, run_benchmark
         from benchmarks.harness.machine import machine_description
     except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != "benchmarks":
+            raise
         raise InputError(
             "bench: the benchmarks are not part of the installed package; run this from a checkout"
         ) from error

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from vpltune.renderer.scene.scene import Scene
 
 DEFAULT_SIZE = (960, 540)
+"""Width and height in pixels, where neither a flag nor a views.json gives them."""
 
 
 @dataclass(frozen=True)

@@ -28,11 +28,15 @@ def doctor(json: JsonOption = False) -> Report:
             escape(finding.fallback),
         )
     mends = dict.fromkeys(finding.mend for finding in findings if finding.mend)
-    verdict = (
-        "This machine can fit and render." if not lacking else f"This machine lacks: {', '.join(lacking)}."
+    runtime_alone = any(each.name == "extras" and each.state == "missing" for each in findings)
+    able = (
+        "This machine can render, export and import; fits need vpltune[tuner]."
+        if runtime_alone
+        else "This machine can fit and render."
     )
+    verdict = f"This machine lacks: {', '.join(lacking)}." if lacking else able
     return Report(
         {"findings": [finding.as_dict() for finding in findings], "status": status},
-        (table, *(f"to mend: {escape(mend)}" for mend in mends), verdict),
+        (table, *(f"to mend: {escape(mend)}" for mend in mends), escape(verdict)),
         MACHINE_LACKS if lacking else OK,
     )

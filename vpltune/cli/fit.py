@@ -58,7 +58,7 @@ def fit(
     ] = False,
     frame_size: Annotated[
         str | None,
-        typer.Option(metavar="WxH", help="Of the frames that are timed. [--size]", show_default=False),
+        typer.Option(metavar="WxH", help="Size of the frames that are timed. [--size]", show_default=False),
     ] = None,
     motion: Annotated[
         bool,

@@ -16,7 +16,8 @@ FIGURES = {
     "energy_ratio": "energy",
     "flip": "FLIP",
 }
-"""Figures by heading; `tuner.metrics.view_metrics.ViewMetrics` says what they are. The table fits into 80 columns."""
+"""Figures by heading; `tuner.metrics.view_metrics.ViewMetrics` says what they are. The table fits into 80
+columns."""
 _SHARES = ("worst_share", "median_error")
 
 

@@ -16,12 +16,13 @@ LARGEST_SIDE = 16384
 """Pixels; also the rule of `views.json`."""
 
 LARGEST_VIEW_COUNT = 64
+"""The largest number of views that `--views` takes."""
 VIEW_COUNT = 4
-"""Views that a scene is fitted to where no other number is asked for: with validation and held-out views,
-ten light positions in all."""
+"""How many views a scene is fitted to by default. With validation and held-out views, that makes ten light
+positions."""
 
 SCENE_SECONDS = 900.0
-"""That a batch gives an attempt at one scene: many times what the slowest we know takes."""
+"""The time limit of a batch for one attempt at a scene: many times what the slowest known scene takes."""
 
 Layer = Literal["final", "direct", "indirect", "irradiance", "albedo", "normal", "depth"]
 Motion = Literal["auto", "none", "light", "camera", "both"]
@@ -90,7 +91,7 @@ BouncesOption = Annotated[
 ]
 ViewSizeOption = Annotated[
     str | None,
-    typer.Option("--size", metavar="WxH", help="Of the views, in pixels. [64x48]", show_default=False),
+    typer.Option("--size", metavar="WxH", help="Size of the views, in pixels. [64x48]", show_default=False),
 ]
 SplitErrorOption = Annotated[
     bool, typer.Option("--split-error", help="Split the error that is left by cause; draws some more frames.")

@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from vpltune.cli.verbosity import detail, is_quiet, is_verbose, say
+
 Progress = Callable[[str, float], None]
 """Called with the stage ("reference", "fit", …) and the share of it that is done, in [0, 1]."""
 
@@ -13,11 +15,15 @@ Progress = Callable[[str, float], None]
 @contextlib.contextmanager
 def shown_progress() -> Iterator[Progress]:
     """Show progress until the block ends; stages appear in the order they are first named."""
-    if sys.stderr.isatty():
+    if is_quiet():
+        yield lambda stage, fraction: None
+    elif sys.stderr.isatty():
         with _bars() as progress:
             yield progress
     else:
-        yield _line_per_stage()
+        begun: dict[str, float] = {}
+        yield _line_per_stage(begun)
+        _tell_seconds(begun)
 
 
 @contextlib.contextmanager
@@ -68,10 +74,9 @@ LINE_SECONDS = 10.0
 """Between two lines of one stage, where there is no terminal."""
 
 
-def _line_per_stage() -> Progress:
+def _line_per_stage(begun: dict[str, float]) -> Progress:
     """A line when a stage begins, and while it goes on one every `LINE_SECONDS` with what is done and
-    left."""
-    begun: dict[str, float] = {}
+    left. `begun` gets the time at which each stage began."""
     last_line = 0.0
 
     def show(stage: str, fraction: float) -> None:
@@ -79,10 +84,18 @@ def _line_per_stage() -> Progress:
         now = time.monotonic()
         if stage not in begun:
             begun[stage], last_line = now, now
-            print(f"vpltune: {stage}", file=sys.stderr, flush=True)
+            say(stage)
         elif now - last_line >= LINE_SECONDS and 0.0 < fraction < 1.0:
             last_line = now
             left = (now - begun[stage]) * (1.0 - fraction) / fraction
-            print(f"vpltune: {stage} {fraction:.0%}, {left:.0f} s left", file=sys.stderr, flush=True)
+            say(f"{stage} {fraction:.0%}, {left:.0f} s left")
 
     return show
+
+
+def _tell_seconds(begun: dict[str, float]) -> None:
+    """With `--verbose`: how long each stage took, where one begins as the last ends."""
+    if begun and is_verbose():
+        ends = [*list(begun.values())[1:], time.monotonic()]
+        for (stage, start), end in zip(begun.items(), ends, strict=True):
+            detail(f"{stage} took {end - start:.2f} s")

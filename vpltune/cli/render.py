@@ -19,6 +19,7 @@ from vpltune.cli.options import (
     checked_scale,
 )
 from vpltune.cli.report import Report, warn
+from vpltune.cli.verbosity import detail
 from vpltune.cli.view_options import (
     ImageSizeOption,
     ViewFlags,
@@ -37,7 +38,9 @@ if TYPE_CHECKING:
     from vpltune.renderer.scene.views import View
 
 LARGEST_DYNAMIC_LIGHT_COUNT = 1_000_000
+"""The largest number that `--dynamic-lights` takes."""
 DYNAMIC_LIGHT_SEED = 0
+"""The seed of their places and directions: one command draws one image."""
 
 
 @takes_view_flags
@@ -122,6 +125,7 @@ def render(
     if factor != 1.0:
         loaded, drawn = scaled(loaded, factor), scaled_view(drawn, factor)
     runtime = Runtime(loaded)
+    detail(f"OpenGL on {runtime.opengl_renderer}")
     bouncing = _bouncing_lights(loaded, drawn, dynamic_lights)
     if frames is None:
         parameters = _write_layer(runtime, tuned, drawn, layer, output, bouncing)

@@ -7,9 +7,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from vpltune.cli.verbosity import say
 from vpltune.renderer.files.strict_json import strict_json
 
+# Exit codes. DEFECT: an error that the program does not foresee.
 OK = 0
+DEFECT = 1
 BAD_INPUT = 2
 MACHINE_LACKS = 3
 PARTLY_DONE = 4
@@ -56,11 +59,6 @@ def print_json(document: Mapping[str, Any]) -> None:
 
 
 def warn(lines: tuple[str, ...]) -> None:
-    """Print each line on stderr as a warning."""
+    """Print each line on stderr as a note."""
     for line in lines:
-        print(f"vpltune: {one_line(line)}", file=sys.stderr)
-
-
-def one_line(text: object) -> str:
-    """`text` with every run of white space made one space."""
-    return " ".join(str(text).split())
+        say(line)

@@ -12,6 +12,7 @@ from vpltune.renderer.scene.scene import Camera, Light, look_at
 from vpltune.renderer.scene.views import check_cone
 
 DEFAULT_YFOV_DEGREES = 50.0
+"""The vertical angle of view of a camera from flags without `--yfov`."""
 DEFAULT_CONE_DEGREES = (0.0, 45.0)
 """KHR_lights_punctual's own defaults."""
 

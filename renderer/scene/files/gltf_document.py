@@ -9,10 +9,9 @@ from vpltune.renderer.scene.files.json_object import JsonObject, parse_json
 from vpltune.renderer.scene.files.limits import DecodedBytes
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
 
-# glTF 2.0 section 4.4: magic and chunk types of a .glb.
 _GLB_MAGIC = b"glTF"
-_JSON_CHUNK = 0x4E4F534A
-_BINARY_CHUNK = 0x004E4942
+# Chunk types "JSON" and "BIN": glTF 2.0, section 4.4.3.
+_JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 
 # Extensions that the readers support.
 READ_EXTENSIONS = frozenset(

@@ -14,8 +14,9 @@ from vpltune.renderer.scene.files.image_texels import GLTF_FORMATS, ImageDecoder
 from vpltune.renderer.scene.files.json_object import JsonObject, shown
 from vpltune.renderer.scene.scene import Material, Texture, Wrap
 
-# OpenGL enums of wrap modes and of nearest filters, as a glTF sampler gives them.
+# OpenGL enums of wrap modes, as a glTF sampler gives them.
 _WRAPS: dict[int, Wrap] = {33071: "clamp_to_edge", 33648: "mirrored_repeat", 10497: "repeat"}
+# And of nearest filters.
 _NEAREST_FILTERS = (9728, 9984, 9986)
 
 

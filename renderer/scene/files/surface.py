@@ -21,7 +21,7 @@ class Surface:
     positions: Float32[np.ndarray, "vertices 3"]
     triangles: Int64[np.ndarray, "triangles 3"]
     normals: Float32[np.ndarray, "vertices 3"] | None = None
-    """Of any length; zero means that the vertex has no normal."""
+    """Any length; zero means that the vertex has no normal."""
     uv: Float32[np.ndarray, "vertices 2"] | None = None
     colors: Float32[np.ndarray, "vertices 3"] | None = None
     """Linear, in [0, 1]."""

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from config_documents import older_document
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.gltf_extras import EXTRAS_KEY, read_gltf_extras, write_gltf_extras
@@ -60,10 +61,11 @@ def test_other_extras_stay_and_a_second_export_replaces_the_first(tuned_scene, t
     root["asset"]["extras"]["author"] = "someone"
     root["scenes"][0]["extras"] = "of another kind"
     (tmp_path / "a.gltf").write_text(json.dumps(root))
-    write_gltf_extras(tmp_path / "a.gltf", tmp_path / "b.gltf", {**DOCUMENT, "visibility": "none"})
+    replaced = CONFIG.seen_by("transmittance")
+    write_gltf_extras(tmp_path / "a.gltf", tmp_path / "b.gltf", json.loads(config_text(replaced)))
     written = json.loads((tmp_path / "b.gltf").read_text())
     assert written["asset"]["extras"]["author"] == "someone"
-    assert read_config(tmp_path / "b.gltf") == CONFIG.seen_by("none")
+    assert read_config(tmp_path / "b.gltf") == replaced
 
 
 def test_relative_paths_still_lead_to_the_buffers(tmp_path):
@@ -103,10 +105,15 @@ def test_what_is_no_gltf_is_refused_and_nothing_written(tmp_path, name, content,
 def test_a_scene_without_a_config_and_one_with_a_bad_one(tmp_path):
     with pytest.raises(InputError, match="holds no extras.vpltune"):
         read_config(SCENES / "cornell-box.glb")
-    write_gltf_extras(SCENES / "cornell-box.glb", tmp_path / "bad.glb", {**DOCUMENT, "version": 2})
-    with pytest.raises(InputError, match="bad.glb: key 'version' is 2"):
+    write_gltf_extras(SCENES / "cornell-box.glb", tmp_path / "bad.glb", {**DOCUMENT, "version": 3})
+    with pytest.raises(InputError, match="bad.glb: key 'version' is 3"):
         read_config(tmp_path / "bad.glb")
-    assert read_gltf_extras(tmp_path / "bad.glb")["version"] == 2
+    assert read_gltf_extras(tmp_path / "bad.glb")["version"] == 3
+
+
+def test_an_older_config_in_a_scene_is_read(tmp_path):
+    write_gltf_extras(SCENES / "cornell-box.glb", tmp_path / "older.glb", older_document(visibility="none"))
+    assert read_config(tmp_path / "older.glb") == TunedConfig(visibility="transmittance")
 
 
 def _gltf_triangle(folder):

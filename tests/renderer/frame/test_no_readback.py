@@ -9,7 +9,9 @@ from built_scenes import ROOM_LIGHTS, colored_room, room_view
 from made_priors import made_prior
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.clip_state import ClipState
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
 from vpltune.renderer.scene.dynamic_lights import DynamicLights, point_lights
@@ -75,61 +77,91 @@ def everything_view(size=(48, 32)) -> View:
 @pytest.mark.parametrize("interleave", [1, 4])
 def test_a_frame_reads_nothing_back(gl_context, calls, light_path, interleave):
     """Ten frames with all kinds of lights, after the first: no read, no wait and no allocation at all."""
-    runtime = Runtime(
-        colored_room(),
-        "default",
-        RuntimeOptions(light_path=light_path, interleave=interleave),
-        context=gl_context,
-        rsm_resolution=64,
-    )
+    runtime = Runtime(colored_room(), RuntimeOptions(light_path=light_path), context=gl_context)
+    config = TunedConfig(quality=Quality(interleave=interleave, rsm_resolution=64))
     view = everything_view()
-    runtime.draw(view, lights=moving_lights(0))
+    runtime.draw(view, config, lights=moving_lights(0))
     calls.clear()
     for frame in range(10):
-        runtime.draw(view, lights=moving_lights(frame))
+        runtime.draw(view, config, lights=moving_lights(frame))
     assert not calls
 
 
-def test_parameters_that_follow_the_scene_are_not_read_back(gl_context, calls):
+@pytest.mark.parametrize("in_a_clip", [True, False])
+def test_parameters_that_follow_the_scene_are_not_read_back(gl_context, calls, in_a_clip):
     """With a prior: measured and set on the GPU, frame by frame, eased or not."""
-    config = TunedConfig(ArtistParameters(vpl_count=64), visibility="maps", auto=made_prior())
-    options = RuntimeOptions(adaptation_frames=5.0)
-    runtime = Runtime(colored_room(), config, options, context=gl_context, rsm_resolution=64)
-    runtime.draw(everything_view())
+    quality = Quality(rsm_resolution=64, adaptation_frames=5.0)
+    config = TunedConfig(ArtistParameters(vpl_count=64), auto=made_prior(), quality=quality)
+    runtime = Runtime(colored_room(), context=gl_context)
+    state = ClipState() if in_a_clip else None
+    runtime.draw(everything_view(), config, state)
     calls.clear()
     for _ in range(5):
-        runtime.draw(everything_view())
+        drawn = runtime.draw(everything_view(), config, state)
     assert not calls
-    runtime.drawn_parameters()
+    drawn.read_parameters()
     assert calls == {"Buffer.read": 1}
 
 
-def test_cells_are_not_read_back(gl_context, calls):
-    """VPLs are moved to the middle of their cells on the GPU, and all buffers are there after one frame."""
-    config = TunedConfig(ArtistParameters(vpl_count=64, lloyd_iterations=2), visibility="maps")
-    runtime = Runtime(colored_room(), config, context=gl_context, rsm_resolution=64)
-    runtime.draw(everything_view())
+def test_parameters_that_are_given_are_not_read_back_either(gl_context, calls):
+    config = TunedConfig(ArtistParameters(vpl_count=64), quality=Quality(rsm_resolution=64))
+    drawn = Runtime(colored_room(), context=gl_context).draw(everything_view(), config)
+    calls.clear()
+    assert drawn.read_parameters() == config.parameters
+    assert not calls
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"lloyd_iterations": 2}, {"density_importance": 0.5}, {"screen_space_strength": 1.0}],
+    ids=lambda changes: next(iter(changes)),
+)
+def test_techniques_that_a_config_asks_for_read_nothing_back(gl_context, calls, changes):
+    """VPLs are clustered, placed and completed on the GPU; all buffers are there after one frame."""
+    config = TunedConfig(ArtistParameters(vpl_count=64, **changes), quality=Quality(rsm_resolution=64))
+    runtime = Runtime(colored_room(), context=gl_context)
+    runtime.draw(everything_view(), config)
     calls.clear()
     for _ in range(5):
-        runtime.draw(everything_view())
+        runtime.draw(everything_view(), config)
+    assert not calls
+
+
+def test_two_configs_in_turn_read_and_allocate_nothing(gl_context, calls):
+    """The frames of both are kept, and so are the programs for points and discs."""
+    quality = Quality(rsm_resolution=64)
+    configs = [
+        TunedConfig(ArtistParameters(vpl_count=64), quality=quality),
+        TunedConfig(
+            ArtistParameters(vpl_count=32, lloyd_iterations=2), visibility="transmittance", quality=quality
+        ),
+    ]
+    runtime = Runtime(colored_room(), context=gl_context)
+    for config in configs:
+        runtime.draw(everything_view(), config)
+    calls.clear()
+    for config in configs * 3:
+        runtime.draw(everything_view(), config)
     assert not calls
 
 
 def test_the_first_frame_reads_nothing_either(gl_context, calls):
     """Only the choice of a light path waits for the GPU, to time it; no data comes back."""
-    runtime = Runtime(colored_room(), "default", context=gl_context, rsm_resolution=64)
+    runtime = Runtime(colored_room(), context=gl_context)
+    config = TunedConfig(quality=Quality(rsm_resolution=64))
     calls.clear()
-    runtime.draw(everything_view(), lights=moving_lights(0))
+    runtime.draw(everything_view(), config, lights=moving_lights(0))
     assert {name for name in calls if name.split(".")[1] not in ALLOCATIONS} == {"Context.finish"}
 
 
 def test_reads_are_seen(gl_context, calls):
     """The count is not blind: an image asked for is one read, buffers captured are more."""
-    runtime = Runtime(colored_room(), "default", context=gl_context, rsm_resolution=64)
+    runtime = Runtime(colored_room(), context=gl_context)
+    config = TunedConfig(quality=Quality(rsm_resolution=64))
     view = everything_view()
-    runtime.render(view)
+    runtime.render(view, config)
     assert calls["Texture.read"] == 1
-    runtime.capture(view)
+    runtime.capture(view, config)
     assert calls["Texture.read"] > 4
     # VPLs, the frame's statistics, the visibility maps and their finer blocks.
     assert calls["Buffer.read"] == 4

@@ -8,7 +8,7 @@ import pandas
 import pytest
 
 from vpltune.renderer.config.tuned_config import TunedConfig, config_text
-from vpltune.renderer.errors import InputError, MachineError
+from vpltune.renderer.errors import InputError
 from vpltune.tuner.batch.batch import run_batch
 from vpltune.tuner.batch.batch_log import BatchLog
 from vpltune.tuner.batch.job import JobOptions
@@ -174,6 +174,6 @@ def test_tensorboard_shows_losses_and_errors(library, fits):
 
 def test_tensorboard_that_is_not_installed_is_said_before_anything_is_fitted(library, fits, monkeypatch):
     monkeypatch.setitem(sys.modules, "tensorboardX", None)
-    with pytest.raises(MachineError, match="tensorboardX is not installed"):
+    with pytest.raises(ModuleNotFoundError, match="tensorboardX"):
         run(library, tensorboard=True)
     assert not fits.scenes

@@ -61,7 +61,7 @@ def test_energy_may_not_leave_one():
     """Half the error with 5 % of the energy gone: refused."""
     metrics = [replace(view, energy_ratio=0.94) for view in scaled([0.5] * 4)]
     found = judged(metrics)
-    assert found.worse == ("energy off by 0.05 more",)
+    assert found.worse == ("energy error up by 0.05",)
     assert not found.accepted
 
 
@@ -121,4 +121,4 @@ def test_what_is_no_number_is_not_accepted():
     """A candidate with NaN is passed over; a start with NaN is kept, with the reason."""
     broken = replace(START, relmse=float("nan"))
     assert verdict([START] * 3, {"tuned": (PARAMETERS, [START, START, broken])}).judgements == ()
-    assert "no number" in verdict([broken] * 3, {"tuned": (PARAMETERS, [START] * 3)}).sentence
+    assert "NaN or infinity" in verdict([broken] * 3, {"tuned": (PARAMETERS, [START] * 3)}).sentence

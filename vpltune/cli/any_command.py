@@ -1,0 +1,57 @@
+"""What holds for every command: `--quiet`, `--verbose`, and one line where an extra is not installed."""
+
+import functools
+import inspect
+from collections.abc import Callable
+from typing import Annotated
+
+import typer
+
+from vpltune.cli.report import Report
+from vpltune.cli.verbosity import choose_verbosity
+from vpltune.renderer.errors import MachineError
+
+QuietOption = Annotated[
+    bool, typer.Option("-q", "--quiet", help="Print only errors on stderr: no progress, no notes.")
+]
+VerboseOption = Annotated[
+    bool, typer.Option("-v", "--verbose", help="Print times, versions, drivers and tracebacks on stderr.")
+]
+
+
+def any_command(command: Callable[..., Report], name: str) -> Callable[..., Report]:
+    """`command` with `--quiet` and `--verbose`, and its missing extra told in one line.
+
+    typer reads a command's options from its signature: there, the two flags come last.
+
+    Raises:
+        MachineError: the command imports a package of an extra that is not installed.
+    """
+
+    @functools.wraps(command)
+    def with_flags(*, quiet: bool, verbose: bool, **given: object) -> Report:
+        choose_verbosity(quiet, verbose)
+        try:
+            return command(**given)
+        except ImportError as error:
+            # Here, because what is wrong is rarely an import.
+            from vpltune.tuner.doctor.extras import extra_to_install, how_to_install
+
+            extra = extra_to_install(error)
+            if extra is None:
+                raise
+            raise MachineError(
+                f"vpltune {name} needs vpltune[{extra}], which is not installed: {how_to_install(extra)}"
+            ) from error
+
+    flags = {"quiet": QuietOption, "verbose": VerboseOption}
+    parameters = [
+        *inspect.signature(command).parameters.values(),
+        *(
+            inspect.Parameter(flag, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=annotation)
+            for flag, annotation in flags.items()
+        ),
+    ]
+    with_flags.__signature__ = inspect.Signature(parameters, return_annotation=Report)  # type: ignore[attr-defined]
+    with_flags.__annotations__ = {each.name: each.annotation for each in parameters}
+    return with_flags

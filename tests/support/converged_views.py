@@ -5,6 +5,7 @@ from built_scenes import ROOM_LIGHTS
 from own_reference import own_reference
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.scene import Camera, look_at
 from vpltune.renderer.scene.views import View
@@ -20,8 +21,8 @@ def corner_view(light: str, size=(32, 24)) -> View:
     return View(light, "fitted", size, camera, (ROOM_LIGHTS[light],))
 
 
-def converged_view(runtime: Runtime, light: str) -> CapturedView:
+def converged_view(runtime: Runtime, config: TunedConfig, light: str) -> CapturedView:
+    """Drawn with `config`, but for its parameters."""
     view = corner_view(light, (24, 18))
-    runtime.parameters = MANY
-    captured = runtime.capture(view)
+    captured = runtime.capture(view, config.with_parameters(MANY))
     return CapturedView(view, own_reference(captured), captured)

@@ -51,7 +51,7 @@ placement's noise is not to be learnt."""
 
 CAPTURE_VERSION = 3
 """Raise whenever the same scene gives other statistics or another loss: old entries are then passed over.
-What the runtime's options and the maps' layout say is in the key by itself."""
+What the runtime's options, the quality and the maps' layout say is in the key by itself."""
 
 
 _TABLES = ("table", "relmse_table")
@@ -149,7 +149,11 @@ def _key(scene: Scene, views: tuple[View, ...]) -> str:
         "captures": [CAPTURE_VERSION, list(ROTATIONS.items()), NOISE_TARGET, MAX_SAMPLES, RSM_RESOLUTION],
         "statistics": STATISTIC_NAMES,
         "parameters": ArtistParameters().as_dict(),
-        "runtime": [asdict(DEFAULT_OPTIONS), VisibilityMapLayout.of(CONFIG).defines],
+        "runtime": [
+            asdict(DEFAULT_OPTIONS),
+            CONFIG.quality.as_dict(),
+            VisibilityMapLayout.of(CONFIG).defines,
+        ],
         "axes": [[spec.low, spec.high, spec.scale] for spec in axes],
         "nodes": [FOOTPRINT_PLACES, BIAS_PLACES, SOFTNESS_PLACES, RECEIVERS],
     }

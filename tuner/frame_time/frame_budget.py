@@ -4,7 +4,7 @@ import hashlib
 import importlib.metadata
 import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -58,6 +58,8 @@ SHADOW_SHARE = 0.25
 time went to a finer RSM alone, and the indirect light was worse than with less."""
 LEAST_COUNT = 4
 """VPLs for each pixel of a block, below which a budget is called too small."""
+CHOICES = ("interleave", "map_size", "rsm_resolution")
+"""Of the quality, what a budget chooses."""
 CHOICE_ROTATIONS = 3
 GUESSED_IMPORTANCE = 0.75
 """η while the count is not yet known: what it costs does not depend on its value."""
@@ -104,7 +106,7 @@ class BudgetFit:
             "predicted_milliseconds": self.predicted,
             "relmse": self.relmse,
             "vpl_count": self.frame.vpl_count,
-            "choice": asdict(self.frame.choice),
+            "choice": {name: getattr(self.frame.choice, name) for name in CHOICES},
             "tries": self.frame.tries,
         }
 

@@ -20,7 +20,10 @@ def finite(value: Any) -> float | None:
 
 def words(name: str) -> str:
     """A key of a file as one would write it."""
-    spoken = {"vpl": "VPL", "vpls": "VPLs", "n": "N", "sha256": "SHA-256", "jax": "JAX", "opengl": "OpenGL"}
+    spoken = {
+        **{"vpl": "VPL", "vpls": "VPLs", "rsm": "RSM", "n": "N"},
+        **{"sha256": "SHA-256", "jax": "JAX", "opengl": "OpenGL"},
+    }
     return " ".join(spoken.get(word, word) for word in name.split("_"))
 
 

@@ -31,11 +31,12 @@ def make_job(tmp_path):
 
 @pytest.fixture
 def fits(monkeypatch):
-    """Takes the place of a fit: which scenes were fitted, and what each ends with."""
-    log = SimpleNamespace(scenes=[], error=None, status="improved", files={"tuned.json": "{}"})
+    """Takes the place of a fit: which scenes were fitted from what, and what each ends with."""
+    log = SimpleNamespace(scenes=[], starts=[], error=None, status="improved", files={"tuned.json": "{}"})
 
     def fit_scene(scene_path, output, options, progress):
         log.scenes.append(scene_path.name)
+        log.starts.append(options.start)
         if log.error is not None:
             raise log.error
         output.mkdir(parents=True)

@@ -13,8 +13,12 @@ METRICS = "metrics.json"
 IMAGES = "images.npz"
 _OLDER_IMAGES = "pictures.npz"
 """The name of the same file in version 0.1.0."""
-_PRESENT_NAMES = {**OLDER_NAMES, "error_budget": "error_breakdown"}
-"""Keys that version 0.1.0 wrote, to those of today."""
+_PRESENT_NAMES = {
+    **OLDER_NAMES,
+    "error_budget": "error_breakdown",
+    "visibility_map_size": "map_size",
+}
+"""Names that version 0.1.0 wrote, to those of today: keys, and what lists hold."""
 _KINDS = {
     "parameters": dict,
     "metrics": dict,
@@ -74,7 +78,12 @@ def _with_present_names(value: Any) -> Any:
     """`value` with the names of today wherever version 0.1.0 wrote others."""
     if isinstance(value, dict):
         return {_PRESENT_NAMES.get(key, key): _with_present_names(each) for key, each in value.items()}
-    return [_with_present_names(each) for each in value] if isinstance(value, list) else value
+    if isinstance(value, list):
+        return [
+            _PRESENT_NAMES.get(each, each) if isinstance(each, str) else _with_present_names(each)
+            for each in value
+        ]
+    return value
 
 
 def read_json_object(path: Path) -> dict[str, Any]:

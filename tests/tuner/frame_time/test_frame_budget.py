@@ -4,10 +4,10 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from built_scenes import colored_room
 from converged_views import converged_view
+from steady_clock import pass_times, steady_clock
 
 from vpltune.cli.budget_flags import budget_from_flags, with_vpl_count
 from vpltune.cli.fit import _report
@@ -17,6 +17,7 @@ from vpltune.renderer.config.tuned_config import TunedConfig, read_config
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene
+from vpltune.tuner.fitting.fit_density import rotation_errors, table_rotations
 from vpltune.tuner.frame_time import cost_model, frame_budget, pareto_front
 from vpltune.tuner.frame_time.cost_model import CostModel, PassCost, measured_cost_model
 from vpltune.tuner.frame_time.fit_budget import BudgetOptions, fit_to_budget
@@ -25,31 +26,10 @@ from vpltune.tuner.frame_time.frame_budget import FrameBudget
 START = TunedConfig(visibility="transmittance")
 
 
-def pass_times(config: TunedConfig) -> dict[str, float]:
-    """Of a machine that draws 0.05 ms a VPL, less where pixels share them out."""
-    count, interleave = config.parameters.vpl_count, config.quality.interleave
-    resolution = config.quality.rsm_resolution or 1024
-    passes = {
-        "reflective_shadow_map": 4.0 * (resolution / 1024) ** 2,
-        "virtual_point_lights": 6.0 * (resolution / 1024) ** 2 + 0.001 * count,
-        "vpl_gather": 1.0 + 0.05 * count / interleave**2,
-        "tone_mapping": 0.5,
-    }
-    if interleave > 1:
-        passes["interleaved_filter"] = 2.0
-    return passes
-
-
 @pytest.fixture
-def steady_clock(monkeypatch, tmp_path):
-    """Frames take 8 % longer than their passes, and none twice the same."""
-    noise = np.random.default_rng(0)
-
-    def frame(self, view, config, frames=5, lights=None):
-        return 1.08 * sum(pass_times(config).values()) * (1.0 + 0.01 * noise.standard_normal())
-
-    monkeypatch.setattr(Runtime, "pass_milliseconds", lambda self, view, config, frames=5: pass_times(config))
-    monkeypatch.setattr(Runtime, "frame_milliseconds", frame)
+def steady(monkeypatch, tmp_path):
+    """A clock that is a formula, fewer rotations, and no costs kept from before."""
+    steady_clock(monkeypatch)
     monkeypatch.setattr(frame_budget, "HELD_OUT_ROTATIONS", 2)
     monkeypatch.setattr(frame_budget, "ROTATIONS", 2)
     monkeypatch.setattr("vpltune.tuner.fitting.fit_density._EXPONENTS", ())
@@ -64,7 +44,7 @@ def prepared(gl_context) -> PreparedScene:
 
 
 @pytest.mark.parametrize("budget", [12.0, pytest.param(30.0, marks=pytest.mark.slow)])
-def test_the_frame_fits_the_budget(steady_clock, prepared, budget):
+def test_the_frame_fits_the_budget(steady, prepared, budget):
     """Within 10 % below and never more than 5 % above, although the model is 8 % off."""
     fit = FrameBudget(prepared, START, (24, 18)).fit(budget)
     assert 0.9 * budget <= fit.frame.milliseconds <= 1.05 * budget
@@ -73,16 +53,19 @@ def test_the_frame_fits_the_budget(steady_clock, prepared, budget):
     assert 0.88 * budget <= again <= 1.07 * budget
     assert config.quality.budget == MetBudget(budget, (24, 18), prepared.runtime.opengl_renderer)
     assert replace(config.quality, budget=None) == fit.frame.choice
+    rotations = table_rotations(2, 0, held_out=True)
+    errors = rotation_errors(prepared.runtime, prepared.views, config, rotations)
+    assert float(errors.mean()) == fit.relmse, "the config draws what was measured"
     assert fit.parameters.vpl_count == fit.frame.vpl_count
     assert fit.document()["budget_milliseconds"] == budget
 
 
-def test_a_budget_below_the_cheapest_frame_is_refused(steady_clock, prepared):
+def test_a_budget_below_the_cheapest_frame_is_refused(steady, prepared):
     with pytest.raises(InputError, match=r"--budget-ms: must be at least .* got 0.5"):
         FrameBudget(prepared, START, (24, 18)).fit(0.5)
 
 
-def test_no_frame_settles_on_fewer_vpls_than_a_budget_must_have(steady_clock, prepared):
+def test_no_frame_settles_on_fewer_vpls_than_a_budget_must_have(steady, prepared):
     """2.35 ms would do for one VPL; four take 2.51, and that is the least that is asked of a budget."""
     budget = FrameBudget(prepared, START, (24, 18))
     choice = Quality(rsm_resolution=256)
@@ -92,7 +75,7 @@ def test_no_frame_settles_on_fewer_vpls_than_a_budget_must_have(steady_clock, pr
 
 
 @pytest.mark.slow
-def test_the_front_is_monotone_and_written(steady_clock, prepared, tmp_path, monkeypatch):
+def test_the_front_is_monotone_and_written(steady, prepared, tmp_path, monkeypatch):
     """More time, less error; each point's config reads back, and table and plot are there."""
     monkeypatch.setattr(pareto_front, "POINTS", 3)
     met, _, found = fit_to_budget(
@@ -116,7 +99,7 @@ def test_the_front_is_monotone_and_written(steady_clock, prepared, tmp_path, mon
     json.dumps(found, allow_nan=False)
 
 
-def test_the_model_is_the_clock_and_is_kept(steady_clock, prepared, monkeypatch):
+def test_the_model_is_the_clock_and_is_kept(steady, prepared, monkeypatch):
     """Lines through two counts give a linear clock back exactly, and a second call measures nothing."""
     view, runtime = prepared.views[0].view, prepared.runtime
     model = measured_cost_model(prepared.scene, (view,), START, runtime)
@@ -133,7 +116,7 @@ def test_the_model_is_the_clock_and_is_kept(steady_clock, prepared, monkeypatch)
     assert measured_cost_model(prepared.scene, (view,), START, runtime) == model
 
 
-def test_damaged_costs_are_measured_anew(steady_clock, prepared):
+def test_damaged_costs_are_measured_anew(steady, prepared):
     view, runtime = prepared.views[0].view, prepared.runtime
     model = measured_cost_model(prepared.scene, (view,), START, runtime)
     (kept,) = (cost_model.cache_folder() / "costs").iterdir()

@@ -263,7 +263,12 @@ def test_parts_appear_where_the_fit_made_them(chromium, fit_copy):
         ):
             assert words in text
         assert "the prior" in text
-        for words in ("3.75 ms", "predicted 3.5 ms", "640×480", "interleave 4, map size 16, RSM resolution 512"):
+        for words in (
+            "3.75 ms",
+            "predicted 3.5 ms",
+            "640×480",
+            "interleave 4, map size 16, RSM resolution 512",
+        ):
             assert words in text
         assert shown.page.locator(".chart .named", has_text="asked for 4 ms").count() == 1
         assert "intensity, extinction coefficient" in text

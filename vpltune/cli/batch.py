@@ -22,7 +22,7 @@ from vpltune.cli.options import (
     VisibilityOption,
     parse_size,
 )
-from vpltune.cli.report import OK, PARTLY_DONE, Report
+from vpltune.cli.report import OK, PARTLY_DONE, Report, warn
 from vpltune.renderer.errors import InputError
 
 if TYPE_CHECKING:
@@ -116,12 +116,15 @@ def batch(
     """Fit every scene of a library. Run it again to resume: finished scenes are not repeated."""
     from vpltune.cli.batch_display import shown_batch
     from vpltune.cli.command_line import command_line
+    from vpltune.cli.quality_flags import with_flags
     from vpltune.renderer.config.tuned_config import config_text, read_config
     from vpltune.tuner.batch.batch import run_batch
     from vpltune.tuner.batch.job import JobOptions
 
+    start, overridden = with_flags(read_config(config), visibility=visibility)
+    warn(overridden)
     options = JobOptions(
-        start=config_text(read_config(config).seen_by(visibility)),
+        start=config_text(start),
         views=views,
         seed=seed,
         bounces=bounces,

@@ -42,12 +42,15 @@ def evaluate(
 
     from vpltune.cli.metrics_table import error_breakdown_table, metrics_table
     from vpltune.cli.progress_display import shown_progress
+    from vpltune.cli.quality_flags import with_flags
     from vpltune.cli.view_flags import camera_from_flags, light_from_flags
     from vpltune.renderer.config.tuned_config import read_config
     from vpltune.tuner.scene_fit.evaluate_scene import EvaluateOptions, evaluate_scene
 
+    tuned, overridden = with_flags(read_config(config), visibility=visibility)
+    warn(overridden)
     options = EvaluateOptions(
-        tuned=read_config(config).seen_by(visibility),
+        tuned=tuned,
         seed=seed,
         bounces=bounces,
         split_error=split_error,

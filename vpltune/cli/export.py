@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 Form = Literal["json", "glsl", "c", "std140", "gltf", "bundle", "web"]
 WITH_SCENE = ("gltf", "bundle", "web")
 WITH_VIEW = ("bundle", "web")
+WITH_CHECKSUM = ("json", "gltf")
 
 
 @takes_view_flags
@@ -57,7 +58,8 @@ def export(
     views: ViewsFileOption = None,
     view: ViewNameOption = None,
     renew_checksum: Annotated[
-        bool, typer.Option("--renew-checksum", help="For json: accept a config that was edited by hand.")
+        bool,
+        typer.Option("--renew-checksum", help="For json and gltf: accept a config that was edited by hand."),
     ] = False,
     *,
     flags: ViewFlags,
@@ -79,8 +81,8 @@ def export(
         )
     if to == "web" and output.suffix.lower() != ".html":
         raise InputError(f"{output}: the file name must end in .html, got {output.suffix or 'no suffix'!r}")
-    if renew_checksum and to != "json":
-        raise InputError(f"--renew-checksum: needs --to json, got --to {to}")
+    if renew_checksum and to not in WITH_CHECKSUM:
+        raise InputError(f"--renew-checksum: needs --to {' or '.join(WITH_CHECKSUM)}, got --to {to}")
     config, overridden = with_flags(read_config(file, check=not renew_checksum), visibility=visibility)
     warn(overridden)
     fit = fit_outcome(config)

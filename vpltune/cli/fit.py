@@ -73,14 +73,16 @@ def fit(
     """Fit a scene; write DIR/tuned.json, views.json, metrics.json, and images before and after."""
     from vpltune.cli.budget_flags import budget_from_flags, with_vpl_count
     from vpltune.cli.progress_display import shown_progress
+    from vpltune.cli.quality_flags import with_flags
     from vpltune.cli.view_flags import camera_from_flags, light_from_flags
     from vpltune.renderer.config.tuned_config import read_config
     from vpltune.tuner.fitting.fit_density import FEW_VPLS
     from vpltune.tuner.scene_fit.fit_scene import FitOptions, fit_scene
 
-    start = with_vpl_count(read_config(config).seen_by(visibility), vpl_count)
+    start, overridden = with_flags(read_config(config), visibility=visibility)
+    warn(overridden)
     options = FitOptions(
-        start=start,
+        start=with_vpl_count(start, vpl_count),
         density=vpl_count is not None and vpl_count <= FEW_VPLS,
         budget=budget_from_flags(vpl_count, budget_ms, pareto, frame_size),
         motion=motion,

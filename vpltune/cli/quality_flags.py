@@ -1,6 +1,7 @@
 """Flags that override a config: `--visibility` and those of its quality part."""
 
 from dataclasses import replace
+from typing import Any
 
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, Visibility
@@ -20,7 +21,7 @@ def with_flags(
     Raises:
         InputError: a value is out of range, or the visibility does not go with the config's prior.
     """
-    given = {name: value for name, value in quality.items() if value is not None}
+    given: dict[str, Any] = {name: value for name, value in quality.items() if value is not None}
     for name, value in given.items():
         try:
             Quality(**{name: value})

@@ -12,7 +12,7 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.image_file import write_png
 from vpltune.renderer.files.srgb import srgb_from_linear
-from vpltune.renderer.frame.capture import octahedral_decode, read_image
+from vpltune.renderer.frame.capture import CapturedFrame, octahedral_decode, read_image
 from vpltune.renderer.frame.frame import Frame
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
@@ -30,7 +30,7 @@ COLUMNS = 4
 LABEL_HEIGHT = 22
 DYNAMIC_LIGHTS = 60
 VPL_RADIUS = 1.6
-"""Of a dot, in pixels."""
+"""The radius of a dot, in pixels."""
 
 
 def main() -> None:
@@ -38,43 +38,42 @@ def main() -> None:
     camera, lights, _ = resolve_camera_and_lights(scene, SCENE, None, None)
     view = View("frame", "fitted", SIZE, camera, lights)
     config = TunedConfig(ArtistParameters(screen_space_strength=1.0))
-    runtime = Runtime(scene, config, RuntimeOptions(light_path="tiles"))
+    runtime = Runtime(scene, RuntimeOptions(light_path="tiles"))
     moving = BouncingLights(scene, DYNAMIC_LIGHTS, 3, 0.5 * flux_beside(scene, lights))
     dynamic = DynamicLights(moving.records)
-    captured = runtime.capture(view, lights=dynamic)
-    frame = runtime._draw(view, lights=dynamic)
-    cells = _buffers(frame, dynamic, captured.scene_length)
-    shown = {name: _display(runtime, irradiance) for name, irradiance in _irradiance(frame).items()}
+    drawn = runtime.draw(view, config, lights=dynamic)
+    captured = drawn.capture()
+    cells = _buffers(drawn.frame, dynamic)
+    shown = {name: _display(runtime, irradiance) for name, irradiance in _irradiance(captured).items()}
     dots = _with_dots(shown["direct irradiance"], view, captured.vpl_position_world, captured.vpl_flux)
     cells |= {"1,024 VPLs, over direct irradiance": dots} | shown
-    cells["final"] = runtime.render(view, lights=dynamic)
+    cells["final"] = runtime.render(view, config, lights=dynamic)
     write_png(IMAGE, np.asarray(_sheet(cells)))
 
 
-def _buffers(frame: Frame, dynamic: DynamicLights, scene_length: float) -> dict[str, np.ndarray]:
-    gbuffer, rsm = frame.gbuffer, frame.rsm
-    accumulation = frame.light_pre_pass.light_pass("tiles").light_accumulation
+def _buffers(frame: Frame, dynamic: DynamicLights) -> dict[str, np.ndarray]:
+    def read(name: str) -> np.ndarray:
+        return read_image(frame.resources, name)
+
     return {
-        "G-buffer: depth": _depth(read_image(gbuffer.depth)),
-        "G-buffer: normal": _normal(read_image(gbuffer.normal), read_image(gbuffer.depth)),
-        "G-buffer: albedo": _srgb(read_image(gbuffer.albedo)),
+        "G-buffer: depth": _depth(read("gbuffer_depth")),
+        "G-buffer: normal": _normal(read("gbuffer_normal"), read("gbuffer_depth")),
+        "G-buffer: albedo": _srgb(read("gbuffer_albedo")),
         f"light accumulation ({len(dynamic)} lights)": _srgb(
-            read_image(accumulation) * dynamic.accumulation_unit * 0.15
+            read("light_accumulation") * dynamic.accumulation_unit * 0.15
         ),
-        "RSM: depth": _depth(read_image(rsm.depth)),
-        "RSM: normal": _normal(read_image(rsm.normal), read_image(rsm.depth)),
-        "RSM: reflectance": _srgb(read_image(rsm.reflectance)),
+        "RSM: depth": _depth(read("rsm_depth")),
+        "RSM: normal": _normal(read("rsm_normal"), read("rsm_depth")),
+        "RSM: reflectance": _srgb(read("rsm_reflectance")),
     }
 
 
-def _irradiance(frame: Frame) -> dict[str, np.ndarray]:
-    vpls, with_near_field = (
-        read_image(image)[..., :3] for image in (frame.vpl_irradiance, frame.indirect_irradiance)
-    )
+def _irradiance(captured: CapturedFrame) -> dict[str, np.ndarray]:
+    vpls = captured.vpl_irradiance
     return {
-        "direct irradiance": read_image(frame.direct_irradiance)[..., :3],
+        "direct irradiance": captured.direct_irradiance,
         "indirect irradiance of the VPLs": vpls,
-        "its near field, in screen space": np.maximum(with_near_field - vpls, 0.0),
+        "its near field, in screen space": np.maximum(captured.indirect_irradiance - vpls, 0.0),
     }
 
 
@@ -98,8 +97,8 @@ def _srgb(linear: np.ndarray) -> np.ndarray:
 
 def _with_dots(image: np.ndarray, view: View, positions: np.ndarray, flux: np.ndarray) -> np.ndarray:
     """A dot at each VPL that the camera faces, in the colour of its flux; what hides it is not asked."""
-    image = Image.fromarray(image // 2)
-    draw = ImageDraw.Draw(image)
+    dimmed = Image.fromarray(image // 2)
+    draw = ImageDraw.Draw(dimmed)
     to_camera = view.camera.world_to_camera
     placed = positions @ to_camera[:3, :3].T + to_camera[:3, 3]
     focal = 0.5 * view.size[1] / np.tan(view.camera.yfov / 2.0)
@@ -109,7 +108,7 @@ def _with_dots(image: np.ndarray, view: View, positions: np.ndarray, flux: np.nd
             u, v = view.size[0] / 2.0 - focal * x / z, view.size[1] / 2.0 + focal * y / z
             box = (u - VPL_RADIUS, v - VPL_RADIUS, u + VPL_RADIUS, v + VPL_RADIUS)
             draw.ellipse(box, fill=tuple(color.tolist()))
-    return np.asarray(image)
+    return np.asarray(dimmed)
 
 
 def _sheet(cells: dict[str, np.ndarray]) -> Image.Image:

@@ -5,11 +5,12 @@
 The gallery's room behind the doorway gets no direct light: what is seen there is one bounce.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.config.tuned_config import TunedConfig, Visibility
 from vpltune.renderer.files.image_file import write_png
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.scene import Camera, look_at
@@ -35,18 +36,21 @@ def main() -> None:
     view = View("round the corner", "held_out", SIZE, Camera(look_at(EYE, TARGET), YFOV), scene.lights)
     references = reference_views(scene, (view,), max_samples=512)
     images = {}
-    for visibility, variants in (("transmittance", ("default", "tuned")), ("maps", ("default",))):
+    shown: dict[Visibility, tuple[str, ...]] = {"transmittance": ("default", "tuned"), "maps": ("default",)}
+    for visibility, variants in shown.items():
         config = TunedConfig(visibility=visibility)
         prepared = prepare_scene(SCENE, SceneOptions(), config, Stopwatch(), lambda *_: None)
         fitted = tuple(each for each in prepared.views if each.view.split == "fitted")
-        tuned = fit_placement(fitted, config.parameters, robust_errors(fitted)).parameters
-        (seen,) = capture_views(prepared.runtime, (view,), references)
-        (evaluated,) = evaluate(scene, prepared.runtime, (seen,), config.parameters, tuned).views
+        parameters = fit_placement(fitted, config.parameters, robust_errors(fitted)).parameters
+        tuned = replace(config, parameters=parameters)
+        (seen,) = capture_views(prepared.runtime, config, (view,), references)
+        (evaluated,) = evaluate(scene, prepared.runtime, (seen,), config, tuned).views
         for variant in variants:
             name = {"default": "untuned", "tuned": "tuned"}[variant]
             caption = captioned(f"{visibility}, {name}", evaluated.metrics[variant])
             images[caption] = evaluated.irradiance[variant]
-    write_png(IMAGE, image_row(prepared.runtime, seen, images, SIZE[1]))
+        row = image_row(prepared.runtime, seen, images, SIZE[1])
+    write_png(IMAGE, row)
 
 
 if __name__ == "__main__":

@@ -11,9 +11,10 @@ import shutil
 import sys
 import tempfile
 from pathlib import Path
+from typing import Literal
 
 from PIL import Image
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, ViewportSize, sync_playwright
 
 from vpltune.__main__ import run
 
@@ -21,7 +22,7 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 SCENES = REPOSITORY / "configs" / "scenes"
 IMAGE = REPOSITORY / "docs" / "report.png"
 SHOWN = "gallery"
-SIZE = {"width": 1180, "height": 1180}
+SIZE: ViewportSize = {"width": 1180, "height": 1180}
 SCALE = 0.6
 STEP = 4
 """Of colour: six bits a channel look the same and weigh a third less."""
@@ -51,12 +52,15 @@ def main() -> None:
     for index, page in enumerate(pages):
         image.paste(page, (index * page.width, 0))
     image = image.resize((round(SCALE * image.width), round(SCALE * image.height)), Image.Resampling.LANCZOS)
-    image = image.point(lambda value: min(255, (value + STEP // 2) // STEP * STEP))
+    coarser = [min(255, (value + STEP // 2) // STEP * STEP) for value in range(256)]
+    image = image.point(coarser * len(image.getbands()))
     image.save(IMAGE, optimize=True)
     print(f"wrote {IMAGE} ({IMAGE.stat().st_size // 1000} kB)")
 
 
-def photograph(browser: Browser, page_path: Path, scheme: str, shown: str, without: str = "") -> Image.Image:
+def photograph(
+    browser: Browser, page_path: Path, scheme: Literal["light", "dark"], shown: str, without: str = ""
+) -> Image.Image:
     """The top of a page once `shown` is there and its images are drawn, but for what `without` selects."""
     page = browser.new_context(viewport=SIZE, color_scheme=scheme).new_page()
     page.goto(page_path.as_uri())

@@ -140,13 +140,18 @@ def _captured(
                 relmse_tables.append(loss_table(captured, parameters, seed=0, robust=False))
                 counts.append(vpl_count)
                 fitted.append(view.split == "fitted")
-    stacked = (
-        LossTable(*(np.stack([getattr(table, part) for table in of_rows]) for part in _TABLE_PARTS))
-        for of_rows in (tables, relmse_tables)
-    )
     return PriorScene(
-        scene.name, np.stack(statistics), *stacked, np.array(counts, np.int32), np.array(fitted)
+        scene.name,
+        np.stack(statistics),
+        _stacked(tables),
+        _stacked(relmse_tables),
+        np.array(counts, np.int32),
+        np.array(fitted),
     )
+
+
+def _stacked(tables: list[LossTable]) -> LossTable:
+    return LossTable(**{part: np.stack([getattr(table, part) for table in tables]) for part in _TABLE_PARTS})
 
 
 def _key(scene: Scene, views: tuple[View, ...]) -> str:

@@ -1,6 +1,7 @@
 """Read the output folder of a fit. It may come from another version, or be incomplete."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -108,7 +109,7 @@ def read_json_object(path: Path) -> dict[str, Any]:
     return document
 
 
-def split_figures(document: dict[str, Any], split: str, variant: str) -> dict[str, Any]:
+def split_figures(document: Mapping[str, Any], split: str, variant: str) -> dict[str, Any]:
     """The figures of a variant over the views of a split, by name; empty if unknown."""
     figures = (document.get("metrics") or {}).get(split)
     figures = figures.get(variant) if isinstance(figures, dict) else None

@@ -3,7 +3,7 @@
 import functools
 import inspect
 from collections.abc import Callable
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -50,6 +50,8 @@ def any_command(command: Callable[..., Report], name: str) -> Callable[..., Repo
             for flag, annotation in flags.items()
         ),
     ]
-    with_flags.__signature__ = inspect.Signature(parameters, return_annotation=Report)  # type: ignore[attr-defined]
-    with_flags.__annotations__ = {each.name: each.annotation for each in parameters}
-    return with_flags
+    # `Any`: the type of a function has no signature of its own to set.
+    typed: Any = with_flags
+    typed.__signature__ = inspect.Signature(parameters, return_annotation=Report)
+    typed.__annotations__ = {each.name: each.annotation for each in parameters}
+    return typed

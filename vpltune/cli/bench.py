@@ -1,12 +1,15 @@
 """`vpltune bench`: runs the benchmarks of a checkout."""
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vpltune.cli.options import JsonOption
 from vpltune.cli.report import Report
 from vpltune.renderer.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import JustifyMethod
 
 
 def bench(
@@ -40,14 +43,15 @@ def _table(rows: list[dict]) -> object:
     from rich.table import Table
 
     table = Table()
-    for heading, justify in (
+    columns: tuple[tuple[str, JustifyMethod], ...] = (
         ("", "left"),
         ("value", "right"),
         ("unit", "left"),
         ("against", "left"),
         ("its value", "right"),
         ("ratio", "right"),
-    ):
+    )
+    for heading, justify in columns:
         # Fold names instead of cutting them: they are search terms.
         table.add_column(heading, justify=justify, overflow="fold")
     for row in rows:

@@ -75,4 +75,4 @@ def _view_from_file(path: Path | None, name: str | None, flags: ViewFlags) -> Vi
         raise InputError(f"--view: must be given: {path} has {', '.join(names)}")
     if name is not None and name not in names:
         raise InputError(f"--view: {path} has {', '.join(names)}, got {name!r:.60}")
-    return found[0] if name is None else found[names.index(name)]
+    return next(view for view in found if name in (None, view.name))

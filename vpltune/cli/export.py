@@ -1,7 +1,7 @@
 """`vpltune export`: writes a config for another program, alone or with a scene to draw."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
@@ -19,12 +19,13 @@ from vpltune.renderer.errors import InputError
 if TYPE_CHECKING:
     from vpltune.cli.chosen_view import ChosenView
     from vpltune.renderer.config.tuned_config import TunedConfig
+    from vpltune.renderer.export.config_export import ExportFormat
     from vpltune.renderer.export.scene_bundle import SceneBundle
 
 Form = Literal["json", "glsl", "c", "std140", "gltf", "bundle", "web"]
 WITH_SCENE = ("gltf", "bundle", "web")
-WITH_VIEW = ("bundle", "web")
-WITH_CHECKSUM = ("json", "gltf")
+WITH_VIEW: Final = ("bundle", "web")
+WITH_CHECKSUM: Final = ("json", "gltf")
 
 
 @takes_view_flags
@@ -120,7 +121,9 @@ def fit_warnings(config: "TunedConfig") -> tuple[str, ...]:
     return (f"this config is from a fit that ended {fit.status}: {fit.sentence or 'no reason given'}",)
 
 
-def _write(config: "TunedConfig", to: Form, output: Path, scene: Path | None) -> None:
+def _write(
+    config: "TunedConfig", to: "ExportFormat | Literal['gltf']", output: Path, scene: Path | None
+) -> None:
     import json
 
     from vpltune.renderer.config.gltf_extras import write_gltf_extras

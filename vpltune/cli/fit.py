@@ -1,6 +1,7 @@
 """`vpltune fit`: fits a config to a scene."""
 
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -93,8 +94,9 @@ def fit(
         camera=camera_from_flags(flags),
         light=light_from_flags(flags),
         command=command_line(),
-        **({} if size is None else {"size": parse_size(size)}),
     )
+    if size is not None:
+        options = replace(options, size=parse_size(size))
     with shown_progress() as progress:
         result = fit_scene(scene, output, options, progress)
     warn(result.notes)

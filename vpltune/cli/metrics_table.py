@@ -2,9 +2,12 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS
+
+if TYPE_CHECKING:
+    from rich.console import JustifyMethod
 
 ROWS = ("default", "tuned", "ceiling")
 SPLITS = {"fitted": "fitted views", "held_out": "held-out views"}
@@ -53,13 +56,14 @@ def parameters_table(
 
     table = Table(title="Parameters", title_justify="left")
     table.add_column("", no_wrap=True)
-    for heading, justify, no_wrap in (
+    columns: tuple[tuple[str, JustifyMethod, bool], ...] = (
         ("value", "right", True),
         ("90 % interval", "right", True),
         ("trades\nwith", "left", False),
         ("default", "right", True),
         ("unit", "left", False),
-    ):
+    )
+    for heading, justify, no_wrap in columns:
         table.add_column(heading, justify=justify, no_wrap=no_wrap)
     for spec in ARTIST_PARAMETERS:
         table.add_row(

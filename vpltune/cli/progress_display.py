@@ -4,9 +4,13 @@ import contextlib
 import sys
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING
 
 from vpltune.cli.verbosity import detail, is_quiet, is_verbose, say
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as Bars
+    from rich.progress import TaskID
 
 Progress = Callable[[str, float], None]
 """Called with the name of a stage ("reference", "fit", …) and the share of it that is done, in [0, 1]."""
@@ -31,6 +35,7 @@ def _bars() -> Iterator[Progress]:
     from rich.console import Console
     from rich.progress import (
         BarColumn,
+        TaskID,
         TaskProgressColumn,
         TextColumn,
         TimeElapsedColumn,
@@ -38,7 +43,7 @@ def _bars() -> Iterator[Progress]:
     )
     from rich.progress import Progress as Bars
 
-    tasks: dict[str, int] = {}
+    tasks: dict[str, TaskID] = {}
     columns = (
         TextColumn("{task.description:<12}"),
         BarColumn(),
@@ -64,7 +69,7 @@ def _bars() -> Iterator[Progress]:
             _finish(bars, done)
 
 
-def _finish(bars: Any, task: int) -> None:
+def _finish(bars: "Bars", task: "TaskID") -> None:
     """End a stage: fill its bar and stop its clock."""
     bars.update(task, completed=1.0)
     bars.stop_task(task)

@@ -1,6 +1,7 @@
 """Flags that override a config: `--visibility` and the quality settings."""
 
 from dataclasses import replace
+from typing import Any
 
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, Visibility
@@ -24,7 +25,7 @@ def with_flags(
         InputError: a value is out of range, or the config has a prior that was trained with another
             visibility.
     """
-    given = {name: value for name, value in quality.items() if value is not None}
+    given: dict[str, Any] = {name: value for name, value in quality.items() if value is not None}
     for name, value in given.items():
         try:
             Quality(**{name: value})

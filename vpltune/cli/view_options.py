@@ -5,7 +5,7 @@ import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -53,7 +53,7 @@ def takes_view_flags(command: Callable[..., Report]) -> Callable[..., Report]:
     names = [field.name for field in fields(ViewFlags)]
 
     @functools.wraps(command)
-    def with_options(**given: object) -> Report:
+    def with_options(**given: Any) -> Report:
         flags = ViewFlags(**{name: given.pop(name) for name in names})
         return command(**given, flags=flags)
 
@@ -66,6 +66,8 @@ def takes_view_flags(command: Callable[..., Report]) -> Callable[..., Report]:
             ]
         else:
             parameters.append(parameter)
-    with_options.__signature__ = inspect.Signature(parameters, return_annotation=Report)
-    with_options.__annotations__ = {each.name: each.annotation for each in parameters}
-    return with_options
+    # `Any`: the type of a function has no signature of its own to set.
+    typed: Any = with_options
+    typed.__signature__ = inspect.Signature(parameters, return_annotation=Report)
+    typed.__annotations__ = {each.name: each.annotation for each in parameters}
+    return typed

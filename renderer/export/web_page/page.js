@@ -5,6 +5,9 @@
 
 const bundle = JSON.parse(document.getElementById("bundle").textContent);
 const shaders = JSON.parse(document.getElementById("shaders").textContent);
+// A config file keeps the number of Lloyd iterations with its quality settings.
+const { lloyd_iterations } = bundle.config.quality;
+const tunedParameters = { ...bundle.config.parameters, lloyd_iterations };
 const BATCH = 32;
 const FULLSCREEN = "web/fullscreen.vert";
 
@@ -466,11 +469,10 @@ class Frame {
   // Add the VPLs from `first` to `end` to the image.
   gather(camera, parameters, first, end) {
     const [target, earlier] = this.indirect;
-    const extinction_coefficient = bundle.config.visibility === "none" ? 0 : parameters.extinction_coefficient;
     const { vpl_gather, vpl_gather_discs } = this.programs;
     fill(target, this.vplsAreDiscs ? vpl_gather_discs : vpl_gather, {
       ...this.cameraValues(camera), ...parameters, ...this.vplValues(this.vpls), ...this.momentSums,
-      extinction_coefficient, first, end, earlier: earlier.textures[0],
+      first, end, earlier: earlier.textures[0],
       visibility_atlas: this.visibility?.textures[0], visibility_details: this.visibilityDetails?.textures[0],
     });
     this.indirect.reverse();

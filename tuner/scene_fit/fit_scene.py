@@ -243,7 +243,7 @@ def _judged(
     }
     notes = undetermined(found.known, parameters)
     if found.document.keys() & {"budget", "pareto"} and parameters != found.tuned:
-        notes = (*notes, "the budget's figures are those of what was found, not of the start that is kept")
+        notes = (*notes, "the budget's figures are those of what was found; validation chose otherwise")
     return _Found(
         status,
         sentence,

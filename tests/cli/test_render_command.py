@@ -10,11 +10,25 @@ import pytest
 from PIL import Image
 
 from vpltune.__main__ import run
-from vpltune.cli.options import Layer
+from vpltune.cli.options import (
+    InterleaveOption,
+    Layer,
+    MapRefinementOption,
+    MapSizeOption,
+    RsmResolutionOption,
+)
+from vpltune.renderer.config.quality import (
+    INTERLEAVES,
+    LARGEST_MAP,
+    LARGEST_RSM,
+    MAP_REFINEMENTS,
+    SMALLEST_MAP,
+    SMALLEST_RSM,
+)
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import MachineError
 from vpltune.renderer.files.image_file import read_exr
 from vpltune.renderer.frame.runtime import Runtime
-from vpltune.renderer.frame.runtime_options import RuntimeOptions
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.views import View, write_views
 
@@ -57,8 +71,8 @@ def test_every_layer_is_a_image_and_an_exr(views_path, tmp_path, layer):
     assert pixels.max() > 0.0
 
 
-def test_maps_are_the_runtimes_unless_asked_otherwise(views_path, tmp_path, capfd):
-    """As fine as `RuntimeOptions` has them, which the help states."""
+def test_a_config_that_says_nothing_of_quality_is_drawn_with_the_defaults(views_path, tmp_path):
+    """`render` has none of its own."""
     drawn = {}
     for refinement in (None, 1):
         more = () if refinement is None else (f"--map-refinement={refinement}",)
@@ -66,14 +80,24 @@ def test_maps_are_the_runtimes_unless_asked_otherwise(views_path, tmp_path, capf
         drawn[refinement] = read_exr(tmp_path / "a.exr")
     scene = read_scene(SCENE)
     (camera,) = scene.cameras
-    ours = Runtime(scene, "default").render(View("front", "fitted", SIZE, camera, scene.lights), "irradiance")
+    view = View("front", "fitted", SIZE, camera, scene.lights)
+    ours = Runtime(scene).render(view, TunedConfig(), layer="irradiance")
     np.testing.assert_array_equal(drawn[None], ours)
     assert (drawn[1] != ours).any()
-    capfd.readouterr()
-    assert run(["render", "--help"]) == 0
-    shown = capfd.readouterr().out
-    for default in (RuntimeOptions.visibility_map_size, RuntimeOptions.visibility_map_refinement):
-        assert f"[{default}]" in shown
+
+
+def test_the_help_states_the_ranges_that_a_config_has():
+    named = {
+        InterleaveOption: ("1|2|4|8", INTERLEAVES),
+        MapRefinementOption: ("1|2|4|8", MAP_REFINEMENTS),
+        MapSizeOption: ("from 4 to 64", (SMALLEST_MAP, LARGEST_MAP)),
+        RsmResolutionOption: ("from 64 to 8192", (SMALLEST_RSM, LARGEST_RSM)),
+    }
+    for option, (words, numbers) in named.items():
+        (shown,) = option.__metadata__
+        assert words in f"{shown.metavar} {shown.help}"
+        assert [int(number) for number in re.findall("[0-9]+", words)] == list(numbers)
+        assert shown.help.endswith("overrides the config.")
 
 
 def test_interleaved_images_are_near_the_full_one(views_path, tmp_path):
@@ -85,12 +109,6 @@ def test_interleaved_images_are_near_the_full_one(views_path, tmp_path):
         means.append(float(read_exr(path).mean()))
     assert means[0] != means[1]
     assert means[1] == pytest.approx(means[0], rel=0.05)
-
-
-def test_a_block_of_another_size_is_refused(views_path, tmp_path, capfd):
-    assert render(views_path, tmp_path / "a.png", "--interleave", "3") == 2
-    assert "--interleave: must be one of (1, 2, 4, 8), got 3" in capfd.readouterr().err
-    assert not list(tmp_path.iterdir())
 
 
 def test_exr_of_final_is_the_radiance_before_the_tone_curve(views_path, tmp_path):

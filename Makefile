@@ -52,8 +52,9 @@ requirements: setup ## pin Python packages, with hashes; with UPGRADE=1 anew
 	    --no-header --no-annotate --no-emit-options --no-emit-index-url --no-emit-trusted-host \
 	    --no-emit-find-links -o requirements.txt pyproject.toml
 
-schema: setup ## write configs/default.json and the JSON Schema anew from the parameter table
+schema: setup ## write configs/default.json, the JSON Schema and docs/parameters.md anew from the parameter table
 	@$(BIN)/python scripts/make_config_files.py
+	@$(BIN)/python scripts/make_parameter_page.py
 
 clean: ## remove the virtual environment and everything made
 	@rm -rf $(VENV) build dist out .pytest_cache .hypothesis .ruff_cache .import_linter_cache

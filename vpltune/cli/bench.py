@@ -1,4 +1,4 @@
-"""`vpltune bench`: the benchmarks of a checkout, each figure beside what it is measured against."""
+"""`vpltune bench`: runs the benchmarks of a checkout."""
 
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,7 +16,7 @@ def bench(
     name: Annotated[str, typer.Argument(metavar="NAME", help="A benchmark, or `all`.")] = "all",
     json: JsonOption = False,
 ) -> Report:
-    """Run a benchmark: each row is a figure, what it is measured against, and their ratio."""
+    """Run a benchmark: each row has a figure, its baseline and their ratio."""
     try:
         from benchmarks import benchmark_names, run_benchmark
         from benchmarks.harness.machine import machine_description
@@ -52,7 +52,7 @@ def _table(rows: list[dict]) -> object:
         ("ratio", "right"),
     )
     for heading, justify in columns:
-        # Names are to be found again, and must not be cut.
+        # Fold names instead of cutting them: they are search terms.
         table.add_column(heading, justify=justify, overflow="fold")
     for row in rows:
         table.add_row(

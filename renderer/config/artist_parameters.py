@@ -277,7 +277,9 @@ class ArtistParameters:
         for name in _SPECS:
             if name not in values:
                 raise InputError(f"{where}: key '{name}' is missing")
-        return cls(**{name: spec.checked(values[name], where) for name, spec in _SPECS.items()})
+        # `checked` gives an int where the parameter is a whole number, which a checker of types cannot know.
+        checked: dict[str, Any] = {name: spec.checked(values[name], where) for name, spec in _SPECS.items()}
+        return cls(**checked)
 
     @property
     def vpls_are_discs(self) -> bool:

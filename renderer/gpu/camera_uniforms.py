@@ -37,10 +37,11 @@ def camera_uniforms(
 ) -> CameraUniforms:
     """The uniforms of `camera` for `size` = (width, height) pixels and a scene within `bounds`."""
     tan_half = math.tan(camera.yfov / 2.0)
+    x, y, z = camera.position_world
     return CameraUniforms(
         camera_to_world=camera.to_world,
         world_to_camera=camera.world_to_camera,
         tan_half_fov=(tan_half * size[0] / size[1], tan_half),
         near_plane=NEAR_PLANE * float(np.linalg.norm(bounds[1] - bounds[0])) / 2.0,
-        eye_world=tuple(float(value) for value in camera.position_world),
+        eye_world=(float(x), float(y), float(z)),
     )

@@ -35,7 +35,7 @@ def create_context() -> moderngl.Context:
         MachineError: no EGL device, an OpenGL older than 4.5, or too few bindings of storage buffers.
     """
     try:
-        context = moderngl.create_context(standalone=True, backend="egl")
+        context = moderngl.create_context(standalone=True, backend="egl")  # pyright: ignore[reportArgumentType] their stub
     # moderngl raises bare Exception; glcontext raises whatever loading libEGL raised.
     except Exception as error:
         raise MachineError(

@@ -102,7 +102,7 @@ class ComputeProgram:
         self._resources = resources
         self._declaration = _Declaration(shader, reads, writes)
         source = ShaderSource(f"{shader}.comp", {**self._declaration.defines(), **(defines or {})})
-        self._program = compiled(resources.context, (source,))
+        self._program: moderngl.ComputeShader = compiled(resources.context, (source,))
         self._declaration.check(source.text, self._program)
         set_uniforms(self._program, **self._declaration.sampler_units())
 
@@ -138,7 +138,7 @@ class RasterProgram:
         self._declaration = _Declaration(shader, reads, ())
         both = {**self._declaration.defines(), **(defines or {})}
         sources = ShaderSource(f"{shader}.vert", both), ShaderSource(f"{shader}.frag", both)
-        self.program = compiled(resources.context, sources)
+        self.program: moderngl.Program = compiled(resources.context, sources)
         self._declaration.check("\n".join(source.text for source in sources), self.program)
         set_uniforms(self.program, **self._declaration.sampler_units())
 

@@ -171,8 +171,9 @@ def _placed_trees(scene: Scene) -> _Placed:
             pieces[instance.mesh] = [
                 (joint, _add_tree(placed, corners)) for joint, corners in _rigid_pieces(mesh) if len(corners)
             ]
-        is_skinned = mesh.skinning is not None
-        first = int(first_joints[scene.animation.instance_skins[index]]) if is_skinned else index
+        first = index
+        if mesh.skinning is not None and scene.animation is not None:
+            first = int(first_joints[scene.animation.instance_skins[index]])
         placed.instances.extend((tree, first + joint) for joint, tree in pieces[instance.mesh])
     return placed
 

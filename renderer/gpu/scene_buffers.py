@@ -136,9 +136,8 @@ class SceneBuffers:
         vertex_starts = np.cumsum([0] + [len(mesh.positions) for mesh in scene.meshes])
         index_starts = np.cumsum([0] + [mesh.triangles.size for mesh in scene.meshes])
         texture_of = [scene.materials[scene.meshes[i.mesh].material].texture for i in scene.instances]
-        order = sorted(
-            range(len(scene.instances)), key=lambda i: -1 if texture_of[i] is None else texture_of[i]
-        )
+        # Instances without a texture come first.
+        order = sorted(range(len(texture_of)), key=lambda i: (texture_of[i] is not None, texture_of[i] or 0))
         commands = np.zeros(len(order), _COMMAND_DTYPE)
         groups: list[DrawGroup] = []
         for position, i in enumerate(order):
@@ -169,7 +168,7 @@ class SceneBuffers:
         for index, instance in enumerate(scene.instances):
             mesh = scene.meshes[instance.mesh]
             records["base_color"][index, :3] = scene.materials[mesh.material].base_color
-            if mesh.skinning is not None:
+            if mesh.skinning is not None and scene.animation is not None:
                 records["skinning"][index] = (
                     self._first_influences[instance.mesh],
                     vertex_starts[instance.mesh],

@@ -4,6 +4,7 @@ import hashlib
 import re
 from collections.abc import Mapping
 from importlib import resources
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -86,10 +87,9 @@ def shaders_digest() -> str:
     return digest.hexdigest()
 
 
-def compiled(
-    context: moderngl.Context, sources: tuple[ShaderSource, ...]
-) -> moderngl.Program | moderngl.ComputeShader:
-    """One compute shader, or a vertex and a fragment shader, compiled once for each context and text.
+def compiled(context: moderngl.Context, sources: tuple[ShaderSource, ...]) -> Any:
+    """The program of one compute shader (`moderngl.ComputeShader`), or of a vertex and a fragment shader
+    (`moderngl.Program`), compiled once for each context and text.
 
     Raises:
         ShaderError: with the driver's log, in which file names and lines are put right.
@@ -121,6 +121,7 @@ def set_uniforms(program: moderngl.Program | moderngl.ComputeShader, **values: o
         uniform = program.get(name, None)
         if uniform is None:
             continue
+        assert isinstance(uniform, moderngl.Uniform), f"{name} is no uniform"
         if isinstance(value, np.ndarray):
             uniform.write(np.ascontiguousarray(value.T, np.float32))
         else:

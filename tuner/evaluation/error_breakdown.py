@@ -113,7 +113,7 @@ def _errors_of_rotations(runtime: Runtime, view: CapturedView, config: TunedConf
         for u, v in shifts
     ]
     single = fmean(_error(view, image) for image in images)
-    mean = _error(view, np.mean(images, axis=0, dtype=np.float64))
+    mean = _error(view, np.asarray(np.mean(images, axis=0, dtype=np.float64)))
     return single, mean - (single - mean) / (ROTATIONS - 1)
 
 

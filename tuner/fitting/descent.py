@@ -188,8 +188,8 @@ def _improve(
     damping = jnp.clip(
         state.damping * jnp.where(better, _NARROWING, _WIDENING), _LEAST_DAMPING, _MOST_DAMPING
     )
-    kept = jax.tree.map(partial(jnp.where, better), (point, tried), (state.point, state.at_point))
-    return _State(*kept, damping), kept[1].squares
+    kept, at_kept = jax.tree.map(partial(jnp.where, better), (point, tried), (state.point, state.at_point))
+    return _State(kept, at_kept, damping), at_kept.squares
 
 
 @partial(jax.jit, static_argnums=0)

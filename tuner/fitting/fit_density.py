@@ -90,7 +90,7 @@ def table_rotations(count: int, seed: int, *, held_out: bool = False) -> tuple[R
     The first one is the identity, unless `held_out`. Held-out rotations have a random stream of their own.
     """
     random = np.random.default_rng([seed, int(held_out)])
-    drawn = [tuple(float(x) for x in pair) for pair in random.random((count, 2))]
+    drawn = [(float(u), float(v)) for u, v in random.random((count, 2))]
     return tuple(drawn) if held_out else ((0.0, 0.0), *drawn[1:])
 
 
@@ -99,8 +99,8 @@ def view_rotations(rotations: Sequence[Rotation], index: int) -> tuple[Rotation,
 
     Otherwise views under the same lights would have the same VPLs, and a fit would see fewer placements.
     """
-    shift = index * np.array(_VIEW_SHIFT)
-    moved = [tuple(float(x) for x in (np.array(rotation) + shift) % 1.0) for rotation in rotations[1:]]
+    along, across = (index * shift for shift in _VIEW_SHIFT)
+    moved = [((u + along) % 1.0, (v + across) % 1.0) for u, v in rotations[1:]]
     return (*rotations[:1], *moved)
 
 

@@ -172,11 +172,12 @@ def intervals(
     covariance = moves.T @ moves
     deviation = np.maximum(np.sqrt(np.diag(covariance)), 1e-30)
     correlation = covariance / np.outer(deviation, deviation)
-    ends = [space.parameters(_with(space.point(tuned), chosen, end), tuned) for end in ends]
+    low, high = (space.parameters(_with(space.point(tuned), chosen, end), tuned) for end in ends)
     return {
         space.names[axis]: Interval(
             float(getattr(tuned, space.names[axis])),
-            *(float(getattr(end, space.names[axis])) for end in ends),
+            float(getattr(low, space.names[axis])),
+            float(getattr(high, space.names[axis])),
             True,
             tuple(
                 space.names[other]

@@ -16,7 +16,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from scipy.linalg.lapack import dpstrf
+from scipy.linalg.lapack import dpstrf  # pyright: ignore[reportAttributeAccessIssue] made at import
 
 from vpltune.tuner.metrics.relative_squared_error import Target
 from vpltune.tuner.surrogate.tabulated_gather import TabulatedGather, node_weights

@@ -56,8 +56,9 @@ def tabulate_gather(
         vpls: VPLs, in units of L.
         visibility: Share of each VPL's light that reaches each receiver, in [0, 1]; None for all of it.
     """
-    arrays = (receivers.position, receivers.normal, visibility)
-    return TabulatedGather(_images(*(None if each is None else jnp.asarray(each) for each in arrays), vpls))
+    position, normal = jnp.asarray(receivers.position), jnp.asarray(receivers.normal)
+    seen = None if visibility is None else jnp.asarray(visibility)
+    return TabulatedGather(_images(position, normal, seen, vpls))
 
 
 def gather_tabulated(table: TabulatedGather, parameters: FalloffParameters) -> Float[Array, "receivers 3"]:
@@ -88,8 +89,8 @@ def _transmittance_place(transmittance: Array | float) -> Array:
 
 
 def _footprint_nodes() -> Float[np.ndarray, " nodes"]:
-    ends = np.arcsinh(2.0 * np.log([_ALPHA.low, _ALPHA.high]))
-    return np.exp(np.sinh(np.linspace(*ends, FOOTPRINT_NODES)) / 2.0).astype(np.float32)
+    first, last = np.arcsinh(2.0 * np.log([_ALPHA.low, _ALPHA.high]))
+    return np.exp(np.sinh(np.linspace(first, last, FOOTPRINT_NODES)) / 2.0).astype(np.float32)
 
 
 def _transmittance_nodes() -> Float[np.ndarray, " nodes"]:

@@ -13,7 +13,6 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
-from jax.tree_util import PyTreeDef
 from jaxtyping import Array, Bool, Float
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
@@ -151,25 +150,25 @@ def gather(
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _image(structure: PyTreeDef, footprint: Array, transmittance: Array, *scene: Array) -> Array:
-    """The gather for k = π. `scene` and `structure` are the flattened receivers, VPLs and visibility."""
+def _image(structure: Any, footprint: Array, transmittance: Array, *scene: Array) -> Array:
+    """The gather for k = π. `scene` and `structure` (a PyTreeDef) are the flattened receivers, VPLs and visibility."""
     return _weighted_flux(partial(_weight, footprint, transmittance), *structure.unflatten(scene))
 
 
 @partial(_image.defjvp, symbolic_zeros=True)
-def _image_jvp(
-    structure: PyTreeDef, primals: tuple[Array, ...], tangents: tuple[Array | SymbolicZero, ...]
-) -> tuple[Array, Array]:
+def _image_jvp(structure: Any, primals: tuple[Array, ...], tangents: tuple[Any, ...]) -> tuple[Array, Array]:
     """The derivatives by α and κ, one more gather each. Reverse mode through all pairs takes longer than
-    these three gathers, most of all for discs."""
+    these three gathers, most of all for discs. A tangent is an array or a `SymbolicZero`."""
     moving = [index for index, tangent in enumerate(tangents) if not isinstance(tangent, SymbolicZero)]
     if any(index > 1 for index in moving):
         # The scene is differentiated as well, so use JAX's own rule.
-        def image(*moved: Array) -> Array:
+        def moved_image(*moved: Array) -> Array:
             values = dict(enumerate(primals)) | dict(zip(moving, moved, strict=True))
             return _image.fun(structure, *values.values())
 
-        return jax.jvp(image, [primals[index] for index in moving], [tangents[index] for index in moving])
+        return jax.jvp(
+            moved_image, [primals[index] for index in moving], [tangents[index] for index in moving]
+        )
     footprint, transmittance, *scene = primals
 
     def by_footprint(*pair: Any) -> Pairs:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Form = Literal["json", "glsl", "c", "std140", "gltf", "bundle", "web"]
 WITH_SCENE = ("gltf", "bundle", "web")
 WITH_VIEW: Final = ("bundle", "web")
-WITH_CHECKSUM = ("json", "gltf")
+WITH_CHECKSUM: Final = ("json", "gltf")
 
 
 @takes_view_flags

@@ -152,7 +152,7 @@ def _shaders(document: dict[str, Any], defines: dict[str, Define]) -> dict[str, 
         names += _IMPORTANCE_SHADERS
     if defines["VISIBILITY_MAP_SIZE"]:
         names += _MAP_SHADERS
-        if defines["VISIBILITY_MAP_REFINEMENT"] > 1:
+        if document["visibility_maps"]["map_refinement"] > 1:
             names += _DETAIL_SHADERS
     return {name: _web_glsl(name, defines) for name in names}
 

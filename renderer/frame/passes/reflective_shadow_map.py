@@ -42,4 +42,4 @@ class ReflectiveShadowMapPass(FramePass):
             set_uniforms(self._program.program, face_index=face)
             self._scene.draw(self._program, self._vertex_array)
         framebuffer.viewport = (0, 0, *rsm.depth.size)
-        framebuffer.scissor = None
+        framebuffer.scissor = (0, 0, *rsm.depth.size)

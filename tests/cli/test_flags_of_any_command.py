@@ -40,11 +40,11 @@ def noted_export(monkeypatch):
     """Reading a config leaves a note and a line in the log."""
     read = vpltune.renderer.config.tuned_config.read_config
 
-    def read_noted(source):
+    def read_noted(source, **options):
         warn(("a note",))
         logging.getLogger("vpltune.renderer").warning("a warning")
         logging.getLogger("vpltune.renderer").debug("a detail")
-        return read(source)
+        return read(source, **options)
 
     monkeypatch.setattr(vpltune.renderer.config.tuned_config, "read_config", read_noted)
 
@@ -136,7 +136,7 @@ def test_quiet_and_verbose_exclude_each_other(capfd, arguments):
 @pytest.mark.parametrize("module", ["jax", "jaxlib.xla_client", "mitsuba", "submitit", "tensorboardX"])
 @pytest.mark.parametrize("more", [[], ["--json"]])
 def test_a_missing_extra_is_one_line_and_exit_code_3(capfd, monkeypatch, tmp_path, module, more):
-    def fail(source):
+    def fail(source, **options):
         raise ModuleNotFoundError(f"No module named {module!r}", name=module)
 
     root = module.partition(".")[0]
@@ -161,7 +161,7 @@ def test_a_missing_extra_is_one_line_and_exit_code_3(capfd, monkeypatch, tmp_pat
     ],
 )
 def test_any_other_failed_import_is_a_defect(capfd, monkeypatch, tmp_path, error):
-    def fail(source):
+    def fail(source, **options):
         raise error
 
     monkeypatch.setattr(vpltune.renderer.config.tuned_config, "read_config", fail)

@@ -1,6 +1,6 @@
 """Check that the code explains itself: docstrings and the comments of constants.
 
-Rules, for Python in renderer, tuner, vpltune and shaders, and for the constants of GLSL:
+Rules, for Python in the folders below, and for the constants of GLSL:
 
     of          a docstring begins with "Of "
     docstring   a public module, class, function or method has no docstring
@@ -20,7 +20,7 @@ from io import StringIO
 from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-FOLDERS = ("renderer", "tuner", "vpltune", "shaders")
+FOLDERS = ("renderer", "tuner", "vpltune", "shaders", "benchmarks", "scripts")
 GLSL_SUFFIXES = (".glsl", ".comp", ".vert", ".frag")
 # Names that every reader knows.
 KNOWN_CONSTANTS = ("PI",)

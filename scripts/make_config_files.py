@@ -1,4 +1,4 @@
-"""Write configs/default.json and the JSON Schema anew from the parameter table."""
+"""Write configs/default.json and the JSON Schema from the parameter table: `make schema`."""
 
 import json
 from pathlib import Path

@@ -1,6 +1,6 @@
-"""Draw docs/frame_buffers.png: every buffer of one frame of the gallery, in the order of the frame.
+"""Draw docs/frame_buffers.png: every buffer of one frame of the gallery, in the order of the passes.
 
-python scripts/make_frame_images.py
+Run `python scripts/make_frame_images.py`.
 """
 
 from pathlib import Path
@@ -13,9 +13,9 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.image_file import write_png
 from vpltune.renderer.files.srgb import srgb_from_linear
 from vpltune.renderer.frame.capture import octahedral_decode, read_image
-from vpltune.renderer.frame.frame import Frame
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
+from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.scene.dynamic_lights import DynamicLights
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.light_motion import BouncingLights, flux_beside
@@ -26,64 +26,72 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 SCENE = REPOSITORY / "configs" / "scenes" / "gallery.glb"
 IMAGE = REPOSITORY / "docs" / "frame_buffers.png"
 SIZE = (272, 204)
+"""Width and height of one buffer's image in pixels. A choice."""
 COLUMNS = 4
+"""Images side by side. A choice."""
 LABEL_HEIGHT = 22
+"""Pixels for the label above an image. A choice."""
+LABEL_SIZE = 14
+"""Height of the label's font in pixels. A choice."""
 DYNAMIC_LIGHTS = 60
+"""Dynamic lights of the frame. A choice: few enough to tell them apart."""
+LIGHTS_SEED = 3
+"""Seed of their places and colours. A choice."""
+LIGHTS_FLUX = 0.5
+"""Their flux over that of lights which stand out beside the scene's own (`flux_beside`). A choice."""
+ACCUMULATION_EXPOSURE = 0.15
+"""Exposure of the light accumulation [1/(W/m²)]. A choice."""
 VPL_RADIUS = 1.6
-"""Of a dot, in pixels."""
+"""Radius of a VPL's dot in pixels. A choice."""
 
 
 def main() -> None:
+    """Draw the frame, and write the sheet of its buffers."""
     scene = read_scene(SCENE)
     camera, lights, _ = resolve_camera_and_lights(scene, SCENE, None, None)
     view = View("frame", "fitted", SIZE, camera, lights)
     config = TunedConfig(ArtistParameters(screen_space_strength=1.0))
-    runtime = Runtime(scene, config, RuntimeOptions(light_path="tiles"))
-    moving = BouncingLights(scene, DYNAMIC_LIGHTS, 3, 0.5 * flux_beside(scene, lights))
-    dynamic = DynamicLights(moving.records)
-    captured = runtime.capture(view, lights=dynamic)
-    frame = runtime._draw(view, lights=dynamic)
-    cells = _buffers(frame, dynamic, captured.scene_length)
-    shown = {name: _display(runtime, irradiance) for name, irradiance in _irradiance(frame).items()}
-    dots = _with_dots(shown["direct irradiance"], view, captured.vpl_position_world, captured.vpl_flux)
-    cells |= {"1,024 VPLs, over direct irradiance": dots} | shown
-    cells["final"] = runtime.render(view, lights=dynamic)
-    write_png(IMAGE, np.asarray(_sheet(cells)))
-
-
-def _buffers(frame: Frame, dynamic: DynamicLights, scene_length: float) -> dict[str, np.ndarray]:
-    gbuffer, rsm = frame.gbuffer, frame.rsm
-    accumulation = frame.light_pre_pass.light_pass("tiles").light_accumulation
-    return {
-        "G-buffer: depth": _depth(read_image(gbuffer.depth)),
-        "G-buffer: normal": _normal(read_image(gbuffer.normal), read_image(gbuffer.depth)),
-        "G-buffer: albedo": _srgb(read_image(gbuffer.albedo)),
-        f"light accumulation ({len(dynamic)} lights)": _srgb(
-            read_image(accumulation) * dynamic.accumulation_unit * 0.15
+    runtime = Runtime(scene, RuntimeOptions(light_path="tiles"))
+    flux = LIGHTS_FLUX * flux_beside(scene, lights)
+    dynamic = DynamicLights(BouncingLights(scene, DYNAMIC_LIGHTS, LIGHTS_SEED, flux).records)
+    final = runtime.render(view, config, lights=dynamic)
+    drawn = runtime.draw(view, config, lights=dynamic)
+    captured = drawn.capture(maps=False)
+    images = _buffers(drawn.frame.resources, dynamic)
+    irradiance = {
+        "direct irradiance": captured.direct_irradiance,
+        "indirect irradiance of the VPLs": captured.vpl_irradiance,
+        "its near field, in screen space": np.maximum(
+            captured.indirect_irradiance - captured.vpl_irradiance, 0.0
         ),
-        "RSM: depth": _depth(read_image(rsm.depth)),
-        "RSM: normal": _normal(read_image(rsm.normal), read_image(rsm.depth)),
-        "RSM: reflectance": _srgb(read_image(rsm.reflectance)),
     }
+    # `display` draws into a frame of its own, after everything has been read.
+    shown = {name: runtime.display(np.ascontiguousarray(image)) for name, image in irradiance.items()}
+    dots = _with_dots(shown["direct irradiance"], view, captured.vpl_position_world, captured.vpl_flux)
+    images |= {f"{len(captured.vpl_flux):,} VPLs, over direct irradiance": dots} | shown
+    write_png(IMAGE, np.asarray(_sheet(images | {"final": final})))
 
 
-def _irradiance(frame: Frame) -> dict[str, np.ndarray]:
-    vpls, with_near_field = (
-        read_image(image)[..., :3] for image in (frame.vpl_irradiance, frame.indirect_irradiance)
-    )
+def _buffers(resources: Resources, dynamic: DynamicLights) -> dict[str, np.ndarray]:
+    """The buffers of the first passes as images, by label."""
+
+    def read(name: str) -> np.ndarray:
+        return read_image(resources, name)
+
+    light = read("light_accumulation") * dynamic.accumulation_unit
     return {
-        "direct irradiance": read_image(frame.direct_irradiance)[..., :3],
-        "indirect irradiance of the VPLs": vpls,
-        "its near field, in screen space": np.maximum(with_near_field - vpls, 0.0),
+        "G-buffer: depth": _depth(read("gbuffer_depth")),
+        "G-buffer: normal": _normal(read("gbuffer_normal"), read("gbuffer_depth")),
+        "G-buffer: albedo": _srgb(read("gbuffer_albedo")),
+        f"light accumulation ({len(dynamic)} lights)": _srgb(ACCUMULATION_EXPOSURE * light),
+        "RSM: depth": _depth(read("rsm_depth")),
+        "RSM: normal": _normal(read("rsm_normal"), read("rsm_depth")),
+        "RSM: reflectance": _srgb(read("rsm_reflectance")),
     }
-
-
-def _display(runtime: Runtime, irradiance: np.ndarray) -> np.ndarray:
-    return runtime.display(np.ascontiguousarray(irradiance))
 
 
 def _depth(stored: np.ndarray) -> np.ndarray:
-    """Reversed depth, nearest over distance: white is nearest, black is nothing."""
+    """Reversed depth in grey: the nearest surface is white, and where there is none the image is black."""
     nearest = stored.max() if stored.any() else 1.0
     return np.repeat((stored / nearest)[..., None], 3, axis=2)
 
@@ -97,9 +105,9 @@ def _srgb(linear: np.ndarray) -> np.ndarray:
 
 
 def _with_dots(image: np.ndarray, view: View, positions: np.ndarray, flux: np.ndarray) -> np.ndarray:
-    """A dot at each VPL that the camera faces, in the colour of its flux; what hides it is not asked."""
-    image = Image.fromarray(image // 2)
-    draw = ImageDraw.Draw(image)
+    """Draw a dot at each VPL before the camera, in the colour of its flux, even if a surface hides it."""
+    dimmed = Image.fromarray(image // 2)
+    draw = ImageDraw.Draw(dimmed)
     to_camera = view.camera.world_to_camera
     placed = positions @ to_camera[:3, :3].T + to_camera[:3, 3]
     focal = 0.5 * view.size[1] / np.tan(view.camera.yfov / 2.0)
@@ -109,21 +117,22 @@ def _with_dots(image: np.ndarray, view: View, positions: np.ndarray, flux: np.nd
             u, v = view.size[0] / 2.0 - focal * x / z, view.size[1] / 2.0 + focal * y / z
             box = (u - VPL_RADIUS, v - VPL_RADIUS, u + VPL_RADIUS, v + VPL_RADIUS)
             draw.ellipse(box, fill=tuple(color.tolist()))
-    return np.asarray(image)
+    return np.asarray(dimmed)
 
 
-def _sheet(cells: dict[str, np.ndarray]) -> Image.Image:
-    rows = -(-len(cells) // COLUMNS)
+def _sheet(images: dict[str, np.ndarray]) -> Image.Image:
+    """All images in a grid, with their labels above them."""
+    rows = -(-len(images) // COLUMNS)
     width, height = SIZE[0], SIZE[1] + LABEL_HEIGHT
     sheet = Image.new("RGB", (COLUMNS * width, rows * height), "white")
     draw = ImageDraw.Draw(sheet)
-    font = ImageFont.load_default(14)
-    for index, (name, image) in enumerate(cells.items()):
+    font = ImageFont.load_default(LABEL_SIZE)
+    for index, (name, image) in enumerate(images.items()):
         left, top = index % COLUMNS * width, index // COLUMNS * height
         if image.dtype != np.uint8:
             image = np.round(np.clip(image, 0.0, 1.0) * 255.0).astype(np.uint8)
         image = Image.fromarray(image)
-        # RSM faces are square: shown whole, with white beside them.
+        # RSM faces are square: white fills the rest.
         image.thumbnail(SIZE, Image.Resampling.BOX)
         sheet.paste(image, (left, top + LABEL_HEIGHT))
         draw.text((left + 4, top + 3), name, fill="black", font=font)

@@ -1,8 +1,8 @@
-"""Draw docs/occluded_corner.png: what lies round the corner, with and without maps, beside the path tracer.
+"""Draw docs/occluded_corner.png: a room that gets no direct light, with and without visibility maps.
 
-    python scripts/make_readme_image.py
-
-The gallery's room behind the doorway gets no direct light: what is seen there is one bounce.
+Run `python scripts/make_readme_image.py`. The camera looks through a doorway of the gallery into the room
+behind it, whose only light is one bounce. The image shows the path tracer, VPLs without visibility, the same
+tuned, and VPLs with visibility maps.
 """
 
 from pathlib import Path
@@ -15,38 +15,45 @@ from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.scene import Camera, look_at
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.evaluation.comparison_image import captioned, image_row
-from vpltune.tuner.evaluation.evaluate import evaluate
 from vpltune.tuner.evaluation.prepare_scene import SceneOptions, Stopwatch, prepare_scene
 from vpltune.tuner.fitting.fit_placement import fit_placement
 from vpltune.tuner.fitting.fit_views import robust_errors
 from vpltune.tuner.reference import reference_views
-from vpltune.tuner.surrogate.captured_view import capture_views
+from vpltune.tuner.surrogate.captured_view import capture_views, runtime_irradiance
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 SCENE = REPOSITORY / "configs" / "scenes" / "gallery.glb"
 IMAGE = REPOSITORY / "docs" / "occluded_corner.png"
 SIZE = (360, 270)
+"""Width and height of each image in pixels. A choice."""
+SAMPLES = 512
+"""Most samples per pixel in each half of the reference. A choice."""
 EYE, TARGET, YFOV = np.array([1.2, 1.5, 3.9]), np.array([3.9, 1.1, 1.3]), 1.0
+"""The camera: where it stands and what it looks at, in world units, and its vertical field of view in
+radians. A choice: none of the fitted views has this camera."""
 
 
 def main() -> None:
+    """Fit the gallery without visibility maps, draw the view, and write the row of images."""
     scene = read_scene(SCENE)
-    # Neither camera nor image size is one that was fitted.
     view = View("round the corner", "held_out", SIZE, Camera(look_at(EYE, TARGET), YFOV), scene.lights)
-    references = reference_views(scene, (view,), max_samples=512)
+    references = reference_views(scene, (view,), max_samples=SAMPLES)
+    untuned = TunedConfig(visibility="transmittance")
+    prepared = prepare_scene(SCENE, SceneOptions(), untuned, Stopwatch(), lambda *_: None)
+    fitted = tuple(each for each in prepared.views if each.view.split == "fitted")
+    tuned = fit_placement(fitted, untuned.parameters, robust_errors(fitted)).parameters
+    configs = {
+        "transmittance, untuned": untuned,
+        "transmittance, tuned": untuned.with_parameters(tuned),
+        "maps, untuned": TunedConfig(visibility="maps"),
+    }
+    runtime = prepared.runtime
+    (seen,) = capture_views(runtime, untuned, (view,), references)
     images = {}
-    for visibility, variants in (("transmittance", ("default", "tuned")), ("maps", ("default",))):
-        config = TunedConfig(visibility=visibility)
-        prepared = prepare_scene(SCENE, SceneOptions(), config, Stopwatch(), lambda *_: None)
-        fitted = tuple(each for each in prepared.views if each.view.split == "fitted")
-        tuned = fit_placement(fitted, config.parameters, robust_errors(fitted)).parameters
-        (seen,) = capture_views(prepared.runtime, (view,), references)
-        (evaluated,) = evaluate(scene, prepared.runtime, (seen,), config.parameters, tuned).views
-        for variant in variants:
-            name = {"default": "untuned", "tuned": "tuned"}[variant]
-            caption = captioned(f"{visibility}, {name}", evaluated.metrics[variant])
-            images[caption] = evaluated.irradiance[variant]
-    write_png(IMAGE, image_row(prepared.runtime, seen, images, SIZE[1]))
+    for name, config in configs.items():
+        image = runtime_irradiance(runtime, config, seen)
+        images[captioned(name, seen.metrics(image))] = image
+    write_png(IMAGE, image_row(runtime, seen, images, SIZE[1]))
 
 
 if __name__ == "__main__":

@@ -37,6 +37,7 @@ from examples.formulas.vpl_importance import importance_cells, importance_factor
 
 FILE = Path(__file__).resolve().parents[1] / "docs" / "test_vectors.json"
 DIGITS = 9
+"""Significant digits of the file's numbers. A choice: more than a float32 holds."""
 
 BOXES = [
     {"name": "floor", "low": [-2.0, -0.2, -2.0], "high": [2.0, 0.0, 2.0], "reflectance": [0.8, 0.7, 0.6]},
@@ -59,6 +60,7 @@ SUN = {
     "intensity": [3.0, 2.5, 2.0],
 }
 RSM_RESOLUTION = 8
+"""Texels along the side of an RSM face. A choice: small, so that the file is."""
 LENGTH = 0.75
 """L of the gather and the maps. Not that of the RSM: every step can be tested alone."""
 
@@ -83,6 +85,7 @@ RECEIVERS = [
     ([0.0, 1.0, -2.2], [0.0, 0.0, -1.0], "on the back of the wall: the horizon hides all but large discs"),
 ]
 ALPHAS, KAPPAS = (0.25, 0.5, 1.0, 4.0), (0.0, 3.0)
+"""Values of α and κ that the gather is computed with. A choice."""
 
 
 def test_vectors() -> dict[str, Any]:
@@ -124,6 +127,7 @@ def receivers() -> tuple[np.ndarray, np.ndarray]:
 
 
 ROTATION = (0.3, 0.7)
+"""Rotation of the point table. A choice: not the identity."""
 
 
 def _point_table() -> dict[str, Any]:
@@ -265,6 +269,7 @@ def _gather() -> dict[str, Any]:
 
 
 MAP_SIZE, MAP_REFINEMENT = 8, 2
+"""Texels along the side of a visibility map, and rays along the side of a texel at a silhouette. A choice."""
 VISIBILITY_RECEIVERS = [
     ([1.0, 0.9, -2.0], [0.0, 0.0, 1.0], "on the wall, in sight"),
     ([-1.55, 0.72, -2.0], [0.0, 0.0, 1.0], "on the wall, in the block's shadow"),
@@ -305,7 +310,7 @@ def cast_map(vpl: dict) -> dict[str, np.ndarray]:
 
 
 def diagonal() -> float:
-    """Of the scene's bounds: how long rays are."""
+    """The diagonal of the scene's bounds, beyond which no ray meets anything."""
     low, high = box_scene.bounds(BOXES)
     return float(np.linalg.norm(high - low))
 

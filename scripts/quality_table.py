@@ -1,4 +1,4 @@
-"""Print README's table of quality from what `vpltune bench quality` left in out/quality."""
+"""Print the table of quality in docs/results.md from the files of `vpltune bench quality` in out/quality."""
 
 import json
 from pathlib import Path
@@ -8,6 +8,7 @@ VARIANTS = ("default", "tuned", "ceiling")
 
 
 def main() -> None:
+    """Print a line for each scene and split: relMSE, energy ratio and FLIP of each variant."""
     print("| scene | split | " + " | ".join(f"{variant}" for variant in VARIANTS) + " | noise floor |")
     print("|---|---|" + "---|" * (len(VARIANTS) + 1))
     for path in sorted(FOLDER.glob("*/metrics.json")):

@@ -1,6 +1,6 @@
-"""Print the table of loss against time and frames that `vpltune bench tuning` left in out/tuning.
+"""Print the table of losses, seconds and frames from the files of `vpltune bench tuning` in out/tuning.
 
-python scripts/tuning_table.py
+Run `python scripts/tuning_table.py`.
 """
 
 import json
@@ -9,7 +9,7 @@ from benchmarks.tuning.tuning import FOLDER, best_found, rows_of, spent_in
 
 
 def main() -> None:
-    """One line for each scene and search, then the rows of the benchmark."""
+    """Print a line for each scene and search, then the rows of the benchmark."""
     scenes = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(FOLDER.glob("*.json"))]
     if not scenes:
         raise SystemExit(f"{FOLDER}: nothing measured yet; run `vpltune bench tuning` first")

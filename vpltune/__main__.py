@@ -138,7 +138,8 @@ def _outcome(arguments: Sequence[str]) -> Report | int:
     except KeyboardInterrupt:
         return _failure(INTERRUPTED, "interrupted")
     except typer.TyperException as error:
-        command = error.ctx.command_path if getattr(error, "ctx", None) else PROGRAM
+        context = getattr(error, "ctx", None)
+        command = PROGRAM if context is None else context.command_path
         return _failure(BAD_INPUT, f"{error.format_message().rstrip('.')}. Try: {command} --help")
     except Exception as error:
         exit_code, explanation = _explained(error)

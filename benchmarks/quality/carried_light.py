@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float64, Int64, UInt8
 
 from vpltune.renderer.config.artist_parameters import parameter_spec
-from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS, AutoPrior, place_of
+from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS, AutoPrior
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, read_config
 from vpltune.renderer.files.image_file import write_png
@@ -88,7 +88,7 @@ def auto_config(prior: AutoPrior | None = None, *, rsm_resolution: int | None = 
 def drawn_places(drawn: DrawnFrame) -> Float64[np.ndarray, " parameters"]:
     """The parameters that a frame was drawn with, as places on their axes in [0, 1]; waits for the GPU."""
     values = drawn.read_parameters().as_dict()
-    return np.array([place_of(parameter_spec(name), values[name]) for name in AUTO_PARAMETERS])
+    return np.array([parameter_spec(name).place_of(values[name]) for name in AUTO_PARAMETERS])
 
 
 def write_carried_light(folder: Path) -> None:

@@ -41,7 +41,7 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
         views = [pixel_errors(view) for view in prepared.views if view.lit]
         for percent, share in SHARES.items():
             held = {
-                measure: np.mean([worst_share(view[measure], share) for view in views])
+                measure: float(np.mean([worst_share(view[measure], share) for view in views]))
                 for measure in views[0]
             }
             made += [

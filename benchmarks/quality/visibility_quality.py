@@ -1,8 +1,9 @@
-"""The error with each kind of visibility: none, mean transmittance, maps, and rays; untuned and tuned.
+"""The error with each kind of visibility: mean transmittance, maps, and rays; untuned and tuned.
 
 Every scene has `VPLS` VPLs and three views with a light position each. Parameters are fitted to two of the
-views, and measured on these and on the held-out third. The ceiling has the same VPLs, with rays towards every
-pixel. Maps without refinement tell what the extra rays at silhouettes are worth.
+views, and measured on these and on the held-out third. Untuned, the mean transmittance is 1, which is no
+visibility at all. The ceiling has the same VPLs, with rays towards every pixel. Maps without refinement tell
+what the extra rays at silhouettes are worth.
 
 `python -m benchmarks.quality.visibility_quality FILE [SCENE …]` writes the figures of each scene to a JSON
 file as soon as they are measured. It skips scenes that the file already has, so that a long run can be split.
@@ -37,14 +38,11 @@ FITTED_VIEWS = 2
 """Views of each scene that are fitted; a third is held out. A choice."""
 DEFAULT = ArtistParameters(vpl_count=VPLS)
 CONFIGS = {
-    "none": TunedConfig(DEFAULT, visibility="transmittance"),
     "transmittance": TunedConfig(DEFAULT, visibility="transmittance"),
     "maps": TunedConfig(DEFAULT, visibility="maps"),
     "maps_unrefined": TunedConfig(DEFAULT, visibility="maps", quality=Quality(map_refinement=1)),
 }
-"""The untuned config of each kind of visibility. Without visibility, κ stays 0 when the others are fitted."""
-HELD = {"none": frozenset({"extinction_coefficient"})}
-"""Parameters that a fit leaves at their defaults, by kind of visibility."""
+"""The untuned config of each kind of visibility."""
 UNREFINED = "maps_unrefined"
 CEILING = "ceiling"
 STATES = ("untuned", "tuned")
@@ -123,7 +121,7 @@ def _drawn_figures(prepared: PreparedScene, mode: str) -> dict[str, dict[str, di
     references = tuple(view.reference for view in prepared.views)
     views = capture_views(runtime, config, tuple(view.view for view in prepared.views), references)
     fitted = _of_fitted(views)
-    tuned = fit_placement(fitted, DEFAULT, robust_errors(fitted), held=HELD.get(mode, frozenset())).parameters
+    tuned = fit_placement(fitted, DEFAULT, robust_errors(fitted)).parameters
     return {
         state: _figures(views, lambda view, c=chosen: runtime_irradiance(runtime, c, view))
         for state, chosen in zip(STATES, (config, config.with_parameters(tuned)), strict=True)

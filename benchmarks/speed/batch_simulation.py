@@ -149,7 +149,8 @@ class DrawnLibrary:
 def drawn_library(scenes: int, random: np.random.Generator) -> DrawnLibrary:
     """Draw `scenes` scenes like the measured ones; some of them are rejected, crash or hang."""
     measured = np.array(MEASURED, np.float64)[random.integers(0, len(MEASURED), scenes)]
-    references = np.exp(random.uniform(*np.log(REFERENCE_S), scenes))
+    low, high = np.log(REFERENCE_S)
+    references = np.exp(random.uniform(low, high, scenes))
     seconds = (measured[:, 1] + references) * np.exp(random.normal(0.0, SCATTER, scenes))
     fate = random.uniform(0.0, 1.0, scenes)
     crashing = (fate >= REFUSED) & (fate < REFUSED + CRASHING)
@@ -230,6 +231,7 @@ def measured_head() -> Head:
         with BatchLog(folder / "log.jsonl") as log:
             started = time.perf_counter()
             for record in found:
+                assert record is not None, "all records of the sample were written"
                 log.write({"event": "record", **asdict(record)})
             per_line = (time.perf_counter() - started) / len(sample)
     return Head(per_byte, per_read_record + per_line, per_known_record, per_read_record)

@@ -92,8 +92,8 @@ def _rows(context: moderngl.Context, progress: Callable[[str, float], None]) -> 
         Row("frame_1080p_1024vpl", whole, "ms", "target on a data-centre GPU, without maps", TARGET_MS)
     )
     modes: tuple[Visibility, ...] = ("transmittance", "maps")
-    others = [("gallery", "maps"), *((name, mode) for name in HARD_SCENES for mode in modes)]
-    others = [(name, mode) for name, mode in others if name in paths]
+    others: list[tuple[str, Visibility]] = [("gallery", "maps")]
+    others.extend((name, mode) for name in HARD_SCENES for mode in modes if name in paths)
     for index, (name, mode) in enumerate(others):
         progress(f"interleaved gather, {name}", 0.6 + 0.4 * index / len(others))
         suffix = "_maps" if mode == "maps" else ""

@@ -22,7 +22,7 @@ from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import REPOSITORY, scenes_folder
 from benchmarks.quality.carried_light import write_carried_light
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
-from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS, AutoPrior, value_at
+from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS, AutoPrior
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.atomic_file import write_text_whole
@@ -125,7 +125,7 @@ def _measured(context: moderngl.Context, learnt: LearntPrior, index: int, scene:
 def _at(point: np.ndarray, rest: ArtistParameters) -> ArtistParameters:
     """The parameters at a point of the prior's unit cube; the others are those of `rest`."""
     values = {
-        name: value_at(parameter_spec(name), float(place))
+        name: parameter_spec(name).within(float(place))
         for name, place in zip(AUTO_PARAMETERS, point, strict=True)
     }
     return replace(rest, **values)

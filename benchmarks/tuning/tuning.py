@@ -323,7 +323,8 @@ def spent_in(scene: dict[str, Any], judge: Judge = "losses") -> dict[str, Spent]
 def rows_of(measured: list[dict[str, Any]]) -> list[Row]:
     """The rows of the benchmark, from the contents of the JSON files of all scenes."""
     result = []
-    for judge, suffix in (("losses", ""), ("held_out", "_held_out")):
+    judges: tuple[tuple[Judge, str], ...] = (("losses", ""), ("held_out", "_held_out"))
+    for judge, suffix in judges:
         spent = [spent_in(scene, judge) for scene in measured]
         soonest = [
             min((scene[name] for name in SEARCHES), key=lambda found: (not found.arrived, found.seconds))
@@ -365,7 +366,7 @@ def _spent_row(name: str, theirs: list[Spent], ours: list[Spent], quantity: str,
     against = f"ours ({sum(mine.arrived for mine in ours)} of {len(ours)} within 1 %)"
     missed = sum(not their.arrived for their in theirs)
     if missed:
-        against += f"; ≥: {missed} of {len(theirs)} never got there"
+        against += f"; a lower bound: {missed} of {len(theirs)} were stopped before"
     return Row(name, ratio * own, unit, against, own)
 
 

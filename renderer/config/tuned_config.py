@@ -20,6 +20,7 @@ Version 1 is read too (`renderer.config.config_versions`).
 import hashlib
 import json
 import math
+import shlex
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -335,9 +336,12 @@ def _checked_light(light: dict[str, Any], where: str) -> dict[str, Any]:
 
 def _check_checksum(checksum: Any, config: TunedConfig, where: str) -> None:
     if checksum != _checksum(_document(config)):
+        file = shlex.quote(where)
+        # JSON alone in the place of a glTF file would be the end of its scene.
+        form = f"gltf --scene {file}" if Path(where).suffix.lower() in GLTF_SUFFIXES else "json"
         raise InputError(
             f"{where}: key 'checksum' does not fit the values; after an edit by hand, renew it: "
-            f"vpltune export {where} --to json -o {where} --renew-checksum"
+            f"vpltune export {file} --to {form} -o {file} --renew-checksum"
         )
 
 

@@ -71,7 +71,7 @@ def _encoder(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable
     encoder = imageio_ffmpeg.write_frames(
         str(path),
         size,
-        fps=fps,
+        fps=fps,  # pyright: ignore[reportArgumentType]  (its type is read off a whole default)
         codec="libx264",
         quality=QUALITY,
         # The default of 16 would resize the image unless 16 divides both sides. They are even, so 2 does.

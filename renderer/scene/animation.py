@@ -208,7 +208,9 @@ def _tracks(channels: tuple[Channel, ...]) -> list[_Track]:
             np.array([channel.duration for channel in group], np.float64),
             np.stack([channel.times for channel in group]),
             np.stack([channel.values for channel in group]),
-            np.stack([channel.tangents for channel in group]) if interpolation == "cubic_spline" else None,
+            np.stack([each.tangents for each in group if each.tangents is not None])
+            if interpolation == "cubic_spline"
+            else None,
         )
         for (animated, interpolation, _), group in groups.items()
     ]

@@ -114,7 +114,8 @@ def light_records(
         faces += own
     all_faces = np.array(faces, FACE_DTYPE) if faces else np.zeros(0, FACE_DTYPE)
     origin = all_faces["light_to_world"][0, 3, :3] if faces else bounds.mean(axis=0)
-    return LightRecords(records, all_faces, tuple(float(value) for value in origin))
+    x, y, z = origin.tolist()
+    return LightRecords(records, all_faces, (x, y, z))
 
 
 def _face_count(light: Light) -> int:

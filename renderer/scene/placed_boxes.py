@@ -36,17 +36,18 @@ def placed_boxes(scene: Scene) -> PlacedBoxes:
     Linear blend skinning puts a vertex between the positions that each of its joints alone would give it. A
     box around the joints' boxes therefore contains it.
     """
-    skins = () if scene.animation is None else scene.animation.skins
+    animation = scene.animation
+    skins = () if animation is None else animation.skins
     first_joints = len(scene.instances) + np.cumsum([0] + [len(skin.joints) for skin in skins])
     boxes: list[np.ndarray] = []
     matrices: list[int] = []
     for index, instance in enumerate(scene.instances):
         mesh = scene.meshes[instance.mesh]
-        if mesh.skinning is None:
+        if mesh.skinning is None or animation is None:
             boxes.append(_box(mesh.positions))
             matrices.append(index)
             continue
-        first = int(first_joints[scene.animation.instance_skins[index]])
+        first = int(first_joints[animation.instance_skins[index]])
         weighted = np.where(mesh.skinning.weights > 0.0, mesh.skinning.joints, -1)
         for joint in np.unique(weighted[weighted >= 0]):
             boxes.append(_box(mesh.skinning.bind_positions[(weighted == joint).any(axis=1)]))

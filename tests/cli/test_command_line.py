@@ -184,7 +184,7 @@ def test_an_output_that_cannot_be_is_refused(capfd, monkeypatch, tmp_path, targe
 )
 @pytest.mark.parametrize("as_json", [False, True])
 def test_each_kind_of_failure_has_its_exit_code(capfd, monkeypatch, tmp_path, error, code, message, as_json):
-    def fail(source):
+    def fail(source, **options):
         raise error
 
     monkeypatch.setattr(vpltune.renderer.config.tuned_config, "read_config", fail)
@@ -199,7 +199,7 @@ def test_each_kind_of_failure_has_its_exit_code(capfd, monkeypatch, tmp_path, er
 
 
 def test_a_defect_shows_its_traceback_and_exit_code_1(capfd, monkeypatch, tmp_path):
-    def fail(source):
+    def fail(source, **options):
         raise ZeroDivisionError("a bug")
 
     monkeypatch.setattr(vpltune.renderer.config.tuned_config, "read_config", fail)

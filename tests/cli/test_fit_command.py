@@ -2,13 +2,15 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from vpltune.__main__ import run
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS
-from vpltune.renderer.config.tuned_config import TunedConfig, read_config, write_config
+from vpltune.renderer.config.quality import Quality
+from vpltune.renderer.config.tuned_config import FitNote, read_config, write_config
 from vpltune.renderer.scene.views import read_views
 from vpltune.tuner.evaluation.view_images import read_view_images
 from vpltune.tuner.metrics.view_metrics import relmse
@@ -40,7 +42,8 @@ def document(fitted, capfd):
 def test_stdout_and_metrics_are_as_documented(fitted, document):
     assert document["status"] == "improved"
     assert document["sentence"].startswith("better than the start on 3 validation views: relMSE ×0.")
-    assert document["provenance"]["status"] == "improved"
+    assert read_config(fitted / "out" / "tuned.json").fit == FitNote("improved", document["sentence"])
+    assert document["quality"] == Quality().as_dict()
     assert document["scene"] == str(SCENE)
     assert document["views"] == str(fitted / "out" / "views.json")
     assert set(document["parameters"]) == {spec.name for spec in ARTIST_PARAMETERS}
@@ -95,8 +98,7 @@ def test_the_choice_is_told_with_every_candidate(fitted, document):
 
 def test_an_export_of_what_was_kept_says_so(fitted, document, capfd, tmp_path):
     config = read_config(fitted / "out" / "tuned.json")
-    kept = TunedConfig(config.parameters, {**config.provenance, "status": "kept", "fit": "no gain"})
-    write_config(tmp_path / "kept.json", kept)
+    write_config(tmp_path / "kept.json", replace(config, fit=FitNote("kept", "no gain")))
     for source, told in ((fitted / "out" / "tuned.json", False), (tmp_path / "kept.json", True)):
         assert run(["export", str(source), "--to", "json", "-o", str(tmp_path / "out.json")]) == 0
         assert ("from a fit that ended kept: no gain" in capfd.readouterr().err) == told
@@ -137,13 +139,3 @@ def test_fit_without_json_ends_with_table_image_and_next_command(fitted, documen
     assert f"image: {fitted / 'again' / 'comparison.png'}" in shown
     assert (fitted / "again" / "comparison.png").exists()
     assert f"next:    vpltune render {SCENE} --config {fitted / 'again' / 'tuned.json'}" in shown
-
-
-def test_without_visibility_transmittance_is_left_alone(fitted, capfd):
-    """The runtime does not look at it then: to move it would pay for leaks with what is not drawn."""
-    arguments = ["--views", "1", "--size", "64x48", "--visibility", "none", "--json"]
-    assert run(["fit", str(SCENE), "-o", str(fitted / "none"), *arguments]) == 0
-    document = json.loads(capfd.readouterr().out)
-    assert document["parameters"]["extinction_coefficient"] == 0.0
-    assert "extinction_coefficient" not in document["uncertainty"]
-    assert document["status"] in ("improved", "kept")

@@ -52,21 +52,23 @@ def test_an_mp4_has_the_frames_asked_for(tmp_path, capfd):
 
 
 def test_a_folder_has_numbered_images_of_one_exposure(tmp_path, monkeypatch):
-    """All frames have the exposure that the first was measured to need: clips must not pump."""
+    """All frames have the exposure that the first was measured to need: clips must not pump.
+
+    That it is the first one's own is `test_the_first_frame_is_the_still_image`.
+    """
     exposures = []
     original = Runtime.render
 
-    def seen(self, view, layer="final", exposure=None, lights=None):
+    def seen(self, view, config, state=None, *, exposure=None, **more):
         exposures.append(exposure)
-        return original(self, view, layer, exposure, lights)
+        return original(self, view, config, state, exposure=exposure, **more)
 
     monkeypatch.setattr(Runtime, "render", seen)
     folder = tmp_path / "frames"
     assert render(folder, "--frames", "3", "--motion", "light") == 0
     names = sorted(entry.name for entry in folder.iterdir())
     assert names == ["frame_00000.png", "frame_00001.png", "frame_00002.png"]
-    assert exposures[0] is None
-    assert exposures[1] == exposures[2] > 0.0
+    assert exposures[0] == exposures[1] == exposures[2] > 0.0
     with Image.open(folder / "frame_00000.png") as first, Image.open(folder / "frame_00002.png") as third:
         assert first.size == (32, 24)
         assert np.abs(np.asarray(first, int) - np.asarray(third, int)).max() > 2
@@ -104,11 +106,11 @@ def test_an_interrupt_leaves_no_half_clip(tmp_path, monkeypatch):
     drawn = []
     original = Runtime.render
 
-    def interrupted(self, *arguments):
+    def interrupted(self, *arguments, **more):
         drawn.append(0)
         if len(drawn) == 3:
             raise KeyboardInterrupt
-        return original(self, *arguments)
+        return original(self, *arguments, **more)
 
     monkeypatch.setattr(Runtime, "render", interrupted)
     assert render(tmp_path / "clip.mp4", "--frames", "5") == 130
@@ -119,11 +121,11 @@ def test_an_interrupt_leaves_whole_images(tmp_path, monkeypatch):
     drawn = []
     original = Runtime.render
 
-    def interrupted(self, *arguments):
+    def interrupted(self, *arguments, **more):
         drawn.append(0)
         if len(drawn) == 3:
             raise KeyboardInterrupt
-        return original(self, *arguments)
+        return original(self, *arguments, **more)
 
     monkeypatch.setattr(Runtime, "render", interrupted)
     assert render(tmp_path / "frames", "--frames", "5") == 130
@@ -136,7 +138,7 @@ def test_an_interrupt_leaves_whole_images(tmp_path, monkeypatch):
 def test_a_clip_that_fails_leaves_the_old_one(tmp_path, monkeypatch):
     path = tmp_path / "clip.mp4"
     path.write_bytes(b"old")
-    monkeypatch.setattr(Runtime, "render", lambda *arguments: 1 / 0)
+    monkeypatch.setattr(Runtime, "render", lambda *arguments, **more: 1 / 0)
     assert render(path, "--frames", "2") not in (0, 2)
     assert path.read_bytes() == b"old"
     assert len(list(tmp_path.iterdir())) == 1

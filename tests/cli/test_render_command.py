@@ -164,7 +164,7 @@ def test_a_scene_gets_camera_and_light_by_itself(tmp_path):
     ("more", "message"),
     [
         (["--view", "back"], "--view: .*views.json has front, dark, got 'back'"),
-        ([], "--view: must be given, .*views.json has front, dark"),
+        ([], "--view: must be given: .*views.json has front, dark"),
         (
             ["--view", "front", "--eye", "0,0,1", "--look-at", "0,0,0"],
             "--views: has its own camera and lights",

@@ -84,18 +84,18 @@ def test_cameras_that_cannot_be_are_refused(flags, message):
 
 REFUSED_LIGHTS = {
     "no type": ({"light_intensity": "3"}, "--light-type: must be given with --light-intensity"),
-    "point without place": ({"light_type": "point"}, "--light-position: a point light needs it"),
+    "point without place": ({"light_type": "point"}, "--light-position: must be given for a point"),
     "point with direction": (
         POINT | {"light_direction": "0,1,0"},
         "--light-direction: a point light has none",
     ),
     "point with target": (POINT | {"light_look_at": "0,1,0"}, "--light-look-at: a point light has none"),
     "point with cone": (POINT | {"light_cone": "1,2"}, "--light-cone: a point light has none"),
-    "spot without place": ({"light_type": "spot", "light_direction": "0,1,0"}, "a spot light needs it"),
-    "spot without aim": (SPOT, "--light-direction: a spot light needs either it or --light-look-at"),
-    "spot aimed twice": (SPOT | {"light_direction": "0,1,0", "light_look_at": "0,0,0"}, "and not both"),
-    "spot at itself": (SPOT | {"light_look_at": "0,2,0"}, "--light-look-at: gives the light no direction"),
-    "no direction": (SPOT | {"light_direction": "0,0,0"}, "--light-direction: gives the light no direction"),
+    "spot without place": ({"light_type": "spot", "light_direction": "0,1,0"}, "given for a spot light"),
+    "spot without aim": (SPOT, "--light-direction: a spot light needs either this or --light-look-at"),
+    "spot aimed twice": (SPOT | {"light_direction": "0,1,0", "light_look_at": "0,0,0"}, "not both"),
+    "spot at itself": (SPOT | {"light_look_at": "0,2,0"}, "--light-look-at: must give the light a direction"),
+    "no direction": (SPOT | {"light_direction": "0,0,0"}, "--light-direction: must give the light"),
     "cone inside out": (
         SPOT | {"light_direction": "0,1,0", "light_cone": "30,10"},
         "0 ≤ inner < outer ≤ π/2",
@@ -107,7 +107,7 @@ REFUSED_LIGHTS = {
     ),
     "sun with cone": (SUN | {"light_cone": "1,2"}, "--light-cone: a directional light has none"),
     "sun with place": (SUN | {"light_position": "1,2,3"}, "takes it only with --light-look-at"),
-    "sun without aim": ({"light_type": "directional"}, "a directional light needs either it or"),
+    "sun without aim": ({"light_type": "directional"}, "a directional light needs either this or"),
     "dark": (POINT | {"light_intensity": "0"}, "--light-intensity: must not be negative or all zero, got 0"),
     "negative": (POINT | {"light_intensity": "1,-1,1"}, "--light-intensity: must not be negative"),
     "two colours": (POINT | {"light_intensity": "1,2"}, "--light-intensity: must be 1 or 3 finite numbers"),

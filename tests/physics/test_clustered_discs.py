@@ -8,44 +8,47 @@ import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
 from converged_views import corner_view
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.artist_parameters import LARGEST_DISC_COUNT, ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
-from vpltune.renderer.frame.passes.clustered_discs import LARGEST_COUNT
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.scene import Camera, Light, look_at, scaled
 from vpltune.renderer.scene.views import View, scaled_view
 from vpltune.tuner.fitting.fit_density import DISC_FOOTPRINT
 
 
-def runtime_with(gl_context, scene=None, resolution=256, **parameters) -> Runtime:
-    relaxation = parameters.get("lloyd_iterations", 4)
-    form = {"lloyd_iterations": relaxation, "falloff_footprint": DISC_FOOTPRINT if relaxation else 0.5}
-    chosen = {**ArtistParameters().as_dict(), "vpl_count": 32, **form, **parameters}
-    config = TunedConfig(ArtistParameters(**chosen), visibility="none")
-    return Runtime(scene or colored_room(), config, rsm_resolution=resolution, context=gl_context)
+def config_with(**parameters) -> TunedConfig:
+    """32 discs, or with `lloyd_iterations` 0 points."""
+    iterations = parameters.get("lloyd_iterations", 4)
+    form = {"lloyd_iterations": iterations, "falloff_footprint": DISC_FOOTPRINT if iterations else 0.5}
+    chosen = ArtistParameters(**{"vpl_count": 32, **form, **parameters})
+    return TunedConfig(chosen, visibility="transmittance", quality=Quality(rsm_resolution=256))
+
+
+@pytest.fixture(scope="module")
+def room(gl_context) -> Runtime:
+    return Runtime(colored_room(), context=gl_context)
 
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 @pytest.mark.parametrize("vpl_count", [1, 32, 300])
-def test_energy_is_kept(gl_context, light, vpl_count):
+def test_energy_is_kept(room, light, vpl_count):
     """All light of the samples is in some cell: total flux is that of points.
 
     With γ = 1, where every sample has the same share of it; to 0.1 %, what filtered colours leave to chance.
     """
-    relaxed, points = (
-        runtime_with(gl_context, vpl_count=count, lloyd_iterations=relaxation).capture(
-            room_view(light, (8, 8))
-        )
-        for count, relaxation in ((vpl_count, 3), (4096, 0))
+    discs, points = (
+        room.capture(room_view(light, (8, 8)), config_with(vpl_count=count, lloyd_iterations=iterations))
+        for count, iterations in ((vpl_count, 3), (4096, 0))
     )
-    np.testing.assert_allclose(relaxed.vpl_flux.sum(axis=0), points.vpl_flux.sum(axis=0), rtol=1e-3)
-    assert relaxed.scene_length == points.scene_length
+    np.testing.assert_allclose(discs.vpl_flux.sum(axis=0), points.vpl_flux.sum(axis=0), rtol=1e-3)
+    assert discs.scene_length == points.scene_length
 
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
-def test_vpls_stand_on_surfaces(gl_context, light):
+def test_vpls_stand_on_surfaces(room, light):
     """The middle of a cell is on a plane of the room, with that plane's normal; none goes round a corner."""
-    captured = runtime_with(gl_context, vpl_count=200).capture(room_view(light, (8, 8)))
+    captured = room.capture(room_view(light, (8, 8)), config_with(vpl_count=200))
     lit = captured.vpl_flux.sum(axis=1) > 0.0
     assert lit.mean() > 0.98
     position, normal = captured.vpl_position_world[lit], captured.vpl_normal_world[lit]
@@ -69,7 +72,7 @@ def test_one_cell_is_a_disc_of_the_same_spread(gl_context):
     view = View(
         "square", "fitted", (8, 8), Camera(look_at(np.array([0.5, 2.0, 0.6]), np.zeros(3)), 0.8), (sun,)
     )
-    captured = runtime_with(gl_context, scene, vpl_count=1).capture(view)
+    captured = Runtime(scene, context=gl_context).capture(view, config_with(vpl_count=1))
     np.testing.assert_allclose(captured.vpl_position_world[0], (0.5, 0.0, 0.6), atol=5e-3)
     assert captured.vpl_footprint[0] == pytest.approx(side / np.sqrt(3.0), rel=1e-2)
 
@@ -84,85 +87,87 @@ def test_a_cell_around_a_hole_stands_beside_it(gl_context):
     view = View(
         "frame", "fitted", (8, 8), Camera(look_at(np.array([0.0, 3.0, 0.1]), np.zeros(3)), 0.8), (sun,)
     )
-    captured = runtime_with(gl_context, scene_of(bars, [(0.5, 0.5, 0.5)]), vpl_count=1).capture(view)
+    scene = scene_of(bars, [(0.5, 0.5, 0.5)])
+    captured = Runtime(scene, context=gl_context).capture(view, config_with(vpl_count=1))
     assert np.abs(captured.vpl_position_world[0, [0, 2]]).max() > 0.75
 
 
 @pytest.mark.parametrize("light", ["spot", "directional"])
-def test_less_error_than_points(gl_context, light):
+def test_less_error_than_points(room, light):
     """Near a corner, against 16,384 points: at most two thirds of the squared error of as many points."""
     view = corner_view(light)
-    truth = runtime_with(gl_context, vpl_count=16384, lloyd_iterations=0).render(view, "irradiance")
+    truth = room.render(view, config_with(vpl_count=16384, lloyd_iterations=0), layer="irradiance")
+    rotations = [(float(u), float(v)) for u, v in np.random.default_rng(5).random((6, 2))]
     error = {}
     for count in (32, 256):
-        for relaxation in (0, 4):
-            runtime = runtime_with(gl_context, vpl_count=count, lloyd_iterations=relaxation)
-            random = np.random.default_rng(5)
-            frames = [runtime.capture(view, tuple(random.random(2))).indirect_irradiance for _ in range(6)]
-            error[count, relaxation] = np.mean((np.array(frames) - truth) ** 2)
+        for iterations in (0, 4):
+            config = config_with(vpl_count=count, lloyd_iterations=iterations)
+            frames = [frame.indirect_irradiance for frame in room.captures(view, config, rotations)]
+            error[count, iterations] = np.mean((np.array(frames) - truth) ** 2)
     assert error[32, 4] < 0.67 * error[32, 0], error
     assert error[256, 4] < 0.67 * error[256, 0], error
 
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
-def test_more_cells_keep_the_mean(gl_context, light):
+def test_more_cells_keep_the_mean(room, light):
     """Doubling N moves the mean irradiance by less than 1 %."""
     view = room_view(light, (48, 36))
     means = []
     for count in (512, 1024):
-        captured = runtime_with(gl_context, vpl_count=count).capture(view)
+        captured = room.capture(view, config_with(vpl_count=count))
         means.append(captured.indirect_irradiance[captured.valid].mean())
     assert means[1] == pytest.approx(means[0], rel=1e-2)
 
 
 @pytest.mark.parametrize("factor", [0.01, 100.0])
-def test_cells_have_no_unit(gl_context, factor):
+def test_cells_have_no_unit(gl_context, room, factor):
     """Scene, camera and light scaled together: the same image, to 1e-3 relative RMSE."""
     view = room_view("spot", (32, 24))
-    image = runtime_with(gl_context).render_radiance(view)
-    grown = runtime_with(gl_context, scaled(colored_room(), factor)).render_radiance(
-        scaled_view(view, factor)
-    )
+    image = room.render_radiance(view, config_with())
+    other = Runtime(scaled(colored_room(), factor), context=gl_context)
+    grown = other.render_radiance(scaled_view(view, factor), config_with())
     assert np.sqrt(np.mean((grown - image) ** 2) / np.mean(image**2)) < 1e-3
 
 
-def test_discs_have_no_near_field(gl_context):
+def test_discs_have_no_near_field(room):
     """They withhold nothing that it could give back."""
+    view = room_view("spot", (32, 24))
     images = [
-        runtime_with(gl_context, screen_space_strength=strength).render(
-            room_view("spot", (32, 24)), "irradiance"
-        )
+        room.render(view, config_with(screen_space_strength=strength), layer="irradiance")
         for strength in (0.0, 2.0)
     ]
     np.testing.assert_array_equal(*images)
 
 
-def test_dark_and_very_many(gl_context):
+def test_dark_and_very_many(room):
     """Without light all is black; beyond the largest count VPLs are points as they were."""
-    dark = runtime_with(gl_context).capture(room_view(None, (16, 12)))
+    dark = room.capture(room_view(None, (16, 12)), config_with())
     assert not dark.indirect_irradiance.any() and np.isfinite(dark.vpl_position_world).all()
-    many = [
-        runtime_with(gl_context, vpl_count=LARGEST_COUNT + 1, lloyd_iterations=relaxation)
-        .capture(room_view("spot", (8, 8)))
-        .vpl_position_world
-        for relaxation in (0, 4)
-    ]
-    np.testing.assert_array_equal(*many)
+    counts = (LARGEST_DISC_COUNT, LARGEST_DISC_COUNT + 1)
+    most, more = (
+        [
+            room.capture(room_view("spot", (8, 8)), config_with(vpl_count=count, lloyd_iterations=iterations))
+            for iterations in (0, 1)
+        ]
+        for count in counts
+    )
+    assert [captured.vpls_are_discs for captured in (*most, *more)] == [False, True, False, False]
+    assert (most[0].vpl_position_world != most[1].vpl_position_world).any()
+    np.testing.assert_array_equal(more[0].vpl_position_world, more[1].vpl_position_world)
 
 
-def test_cells_steady_a_swept_light(gl_context):
+def test_cells_steady_a_swept_light(room):
     """Under a light that creeps, irradiance from cells jumps no more from frame to frame than from points."""
     changes = {}
-    for relaxation in (0, 4):
-        runtime = runtime_with(gl_context, vpl_count=64, lloyd_iterations=relaxation)
+    for iterations in (0, 4):
+        config = config_with(vpl_count=64, lloyd_iterations=iterations)
         images = []
         for step in range(16):
             place = np.array([0.1 + 0.004 * step, 0.9, 0.05])
             light = Light("spot", np.full(3, 4.0), place, np.array([0.0, -1.0, 0.0]), 0.3, 0.85)
             camera = room_view("spot").camera
-            images.append(
-                runtime.render(View("s", "fitted", (32, 24), camera, (light,)), "irradiance").copy()
-            )
+            view = View("s", "fitted", (32, 24), camera, (light,))
+            images.append(room.render(view, config, layer="irradiance"))
         second = np.diff(np.array(images, np.float64), n=2, axis=0)
-        changes[relaxation] = np.abs(second).mean() / np.mean(images)
+        changes[iterations] = np.abs(second).mean() / np.mean(images)
     assert changes[4] < changes[0], changes

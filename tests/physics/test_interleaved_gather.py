@@ -6,19 +6,27 @@ from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
 from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
-from vpltune.renderer.frame.capture import octahedral_decode, read_image
-from vpltune.renderer.frame.passes.interleaved_filter import InterleavedFilterPass
+from vpltune.renderer.frame.capture import CapturedFrame, octahedral_decode, read_image
+from vpltune.renderer.frame.frame_pass import FrameInputs
+from vpltune.renderer.frame.passes.interleaved_filter import (
+    InterleavedFilterPass,
+    NearFieldFilterPass,
+    _Filter,
+)
 from vpltune.renderer.frame.runtime import Runtime
-from vpltune.renderer.frame.runtime_options import RuntimeOptions
 from vpltune.renderer.gpu.camera_uniforms import camera_uniforms
 from vpltune.renderer.gpu.render_targets import (
+    EMPTY_DISPATCH,
     create_direction_target,
     create_gbuffer,
     create_irradiance_target,
     create_pixel_list,
 )
+from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.light_faces import light_records
 from vpltune.renderer.scene.placement import resolve_camera_and_lights
 from vpltune.renderer.scene.scene import Camera, Light, look_at
 from vpltune.renderer.scene.views import View
@@ -28,15 +36,9 @@ UNLIT = {"bevy-irradiancevolumeexample"}
 """From its own camera, the VPLs light nothing that is seen."""
 
 
-def captured(gl_context, scene, view, interleave, **parameters):
-    config = TunedConfig(ArtistParameters(**{**ArtistParameters().as_dict(), **parameters}))
-    return Runtime(scene, config, RuntimeOptions(interleave=interleave), context=gl_context).capture(view)
-
-
-@pytest.mark.parametrize("interleave", [0, 3, 16])
-def test_other_block_sizes_are_refused(interleave):
-    with pytest.raises(ValueError, match=f"interleave: must be one of .* got {interleave}"):
-        RuntimeOptions(interleave=interleave)
+def captured(gl_context, scene, view, interleave, **parameters) -> CapturedFrame:
+    config = TunedConfig(ArtistParameters(**parameters), quality=Quality(interleave=interleave))
+    return Runtime(scene, context=gl_context).capture(view, config)
 
 
 @pytest.mark.parametrize("interleave", [2, 4, 8])
@@ -82,14 +84,6 @@ def test_energy_of_discs_is_that_of_the_full_gather(gl_context, light):
     assert ratio == pytest.approx(1, rel=0.01)
 
 
-def test_blocks_are_no_larger_than_vpls_go_round():
-    asked = RuntimeOptions(interleave=8)
-    assert [asked.interleave_for(count) for count in (1, 3, 4, 15, 16, 63, 64, 1024)] == [
-        *(1, 1, 2, 2, 4, 4, 8, 8)
-    ]
-    assert RuntimeOptions(interleave=2).interleave_for(1024) == 2
-
-
 @pytest.mark.parametrize("interleave", [2, 4, 8])
 def test_an_open_plane_is_the_mean_over_its_window(gl_context, interleave):
     """On a plane every subset counts once: only the light's change within the window is left, below 0.1 %.
@@ -111,28 +105,56 @@ def test_an_open_plane_is_the_mean_over_its_window(gl_context, interleave):
     np.testing.assert_allclose(shared[inner, inner], full[inner, inner], rtol=1e-3)
 
 
-def filtered(gl_context, interleave, image, depth_and_normal, refine=False, light=None):
-    """An image through the filter over a G-buffer of (near / distance, octahedral normal) per pixel.
+def drawn_gbuffer(gl_context, image, depth_and_normal, light=None) -> Resources:
+    """What the filter reads: a G-buffer of (near / distance, octahedral normal) per pixel, an image over it.
 
-    `light` is the octahedral direction that it comes from; None leaves relighting out.
+    `light` is the octahedral direction that it comes from.
     """
     height, width = image.shape[:2]
     size = (width, height)
+    resources = Resources(gl_context)
     gbuffer = create_gbuffer(gl_context, size)
     depth, normal = depth_and_normal
     gbuffer.depth.write(np.ascontiguousarray(depth[::-1], np.float32).tobytes())
     gbuffer.normal.write(octahedral_texels(normal))
-    interleaved, out = (create_irradiance_target(gl_context, size) for _ in range(2))
-    interleaved.write(np.ascontiguousarray(image[::-1], np.float32).tobytes())
-    camera = camera_uniforms(Camera(np.eye(4), 0.8), size, np.array([[-1.0, -1, -1], [1, 1, 1]]))
-    pixel_list = create_pixel_list(gl_context, size)
-    direction = create_direction_target(gl_context, size)
+    resources["gbuffer_depth"], resources["gbuffer_normal"] = gbuffer.depth, gbuffer.normal
+    for name in ("shared_irradiance", "vpl_irradiance", "near_field_irradiance"):
+        resources[name] = create_irradiance_target(gl_context, size)
+    resources.texture("shared_irradiance").write(image_texels(image))
+    resources["shared_direction"] = create_direction_target(gl_context, size)
     if light is not None:
-        direction.write(octahedral_texels(light))
-    filter_pass = InterleavedFilterPass(gl_context, interleave, refine=refine, relight=light is not None)
-    filter_pass.draw(camera, gbuffer, interleaved, out, direction=direction, pixel_list=pixel_list)
-    listed = int(np.frombuffer(pixel_list.buffer.read(16), np.uint32)[3])
-    return read_image(out), listed
+        resources.texture("shared_direction").write(octahedral_texels(light))
+    resources["pixel_list"] = create_pixel_list(gl_context, size)
+    resources.write("pixel_list", EMPTY_DISPATCH)
+    return resources
+
+
+def inputs_of(resources: Resources) -> FrameInputs:
+    bounds = np.array([[-1.0, -1, -1], [1, 1, 1]])
+    camera = camera_uniforms(Camera(np.eye(4), 0.8), resources.texture("shared_irradiance").size, bounds)
+    return FrameInputs(camera, light_records((), bounds), ArtistParameters(), 1.0)
+
+
+def listed(resources: Resources) -> int:
+    return int(np.frombuffer(resources.read("pixel_list", 16), np.uint32)[3])
+
+
+def filtered(gl_context, interleave, image, depth_and_normal, refine=False, light=None):
+    """An image through the filter, and the number of pixels that it lists; `light` None does not relight."""
+    resources = drawn_gbuffer(gl_context, image, depth_and_normal, light)
+    _Filter(
+        resources,
+        interleave,
+        reads=("shared_irradiance as interleaved", "shared_direction as direction"),
+        target="vpl_irradiance",
+        relight=light is not None,
+        refine=refine,
+    ).draw(inputs_of(resources))
+    return read_image(resources, "vpl_irradiance"), listed(resources)
+
+
+def image_texels(image):
+    return np.ascontiguousarray(image[::-1], np.float32).tobytes()
 
 
 def octahedral_texels(encoded):
@@ -258,6 +280,50 @@ def test_uneven_subsets_ask_for_a_full_gather(gl_context):
     assert listed == 31 * 31
 
 
+def test_with_visibility_maps_more_pixels_ask_for_a_full_gather(gl_context):
+    """What the pass of a frame lists: as the filter with both of its flags, and more where shadows count."""
+    random = np.random.default_rng(7)
+    shape = (32, 40)
+    image = np.ones((*shape, 4))
+    image[..., :3] = random.uniform(0.0, 1.0, (*shape, 1)) ** 2
+    depth, normal = flat_wall(shape)
+    depth = np.where(random.random(shape) < 0.3, 2.0 * depth, depth)
+    light = np.tile(FACING + 0.05, (*shape, 1))
+    counts = []
+    for shadowed in (False, True):
+        resources = drawn_gbuffer(gl_context, image, (depth, normal), light)
+        filter_pass = InterleavedFilterPass(resources, 4, shadowed=shadowed)
+        # The second frame starts with an empty list, too.
+        for _ in range(2):
+            filter_pass.draw(inputs_of(resources))
+        counts.append(listed(resources))
+    out, expected = filtered(gl_context, 4, image, (depth, normal), refine=True, light=light)
+    assert counts[0] == expected
+    assert 0 < counts[0] < counts[1] <= depth.size
+    np.testing.assert_array_equal(read_image(resources, "vpl_irradiance"), out)
+
+
+def test_the_near_field_is_added_to_the_vpls(gl_context):
+    """Filtered as any image, without relighting; the VPLs' own light is read and left as it is."""
+    random = np.random.default_rng(8)
+    shape = (24, 32)
+    image, base = np.ones((*shape, 4)), np.ones((*shape, 4))
+    image[..., :3], base[..., :3] = random.random((2, *shape, 3))
+    depth, normal = flat_wall(shape)
+    depth[:, 20:] *= 2.0
+    depth[:3] = 0.0
+    resources = drawn_gbuffer(gl_context, image, (depth, normal))
+    resources.texture("vpl_irradiance").write(image_texels(base))
+    NearFieldFilterPass(resources, 4, lambda inputs: True).draw(inputs_of(resources))
+    alone, _ = filtered(gl_context, 4, image, (depth, normal))
+    seen = depth > 0.0
+    found = read_image(resources, "near_field_irradiance")
+    np.testing.assert_allclose(found[seen][:, :3], (alone + base)[seen][:, :3], rtol=1e-6)
+    assert not found[~seen].any()
+    assert listed(resources) == 0
+    np.testing.assert_array_equal(read_image(resources, "vpl_irradiance"), base.astype(np.float32))
+
+
 @pytest.mark.parametrize(("interleave", "tolerance"), [(2, 0.02), (8, 0.05)])
 def test_fewer_vpls_than_pixels_of_a_block(gl_context, interleave, tolerance):
     """One VPL for 4 or 64 pixels: what is lit asks for a full gather, and the energy is nearly that of one.
@@ -276,16 +342,15 @@ def error_and_energy(gl_context, path, visibility):
     scene = read_scene(path)
     camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
     view = View(path.stem, "fitted", (640, 360), camera, lights)
-    config = TunedConfig(ArtistParameters(vpl_count=1024), visibility=visibility)
-    full, shared = (
-        Runtime(scene, config, RuntimeOptions(interleave=n), context=gl_context).capture(view) for n in (1, 4)
-    )
+    config = TunedConfig(visibility=visibility, quality=Quality(interleave=4))
+    runtime = Runtime(scene, context=gl_context)
+    full, shared = (runtime.capture(view, each) for each in (config.with_full_gather(), config))
     images = shared.vpl_irradiance[full.valid], full.vpl_irradiance[full.valid]
     return relmse(*images), energy_ratio(*images)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("visibility", ["none", "maps"])
+@pytest.mark.parametrize("visibility", ["transmittance", "maps"])
 @pytest.mark.parametrize("path", OWN_SCENES, ids=lambda path: path.stem)
 def test_our_scenes_differ_little_from_the_full_gather(gl_context, path, visibility):
     """relMSE against the full gather under 1 %, energy within 1 %, with and without visibility maps.
@@ -306,15 +371,15 @@ def test_scenes_of_others_differ_little_from_the_full_gather(gl_context, scenes_
     not over its neighbour's is in no neighbour's light. With maps, few pixels at an edge of one VPL's shadow
     can hold more error than all others, and no bound is stated.
     """
-    error, energy = error_and_energy(gl_context, outside_scene(scenes_folder, name), "none")
+    error, energy = error_and_energy(gl_context, outside_scene(scenes_folder, name), "transmittance")
     assert error < 0.01
     assert energy == pytest.approx(1, rel=0.05)
 
 
 def test_frames_repeat_bitwise(gl_context):
     """The list of pixels fills in any order; the image does not show it."""
-    view = room_view("spot", (96, 72))
-    runtime = Runtime(colored_room(), "default", RuntimeOptions(interleave=4), context=gl_context)
-    first = runtime.capture(view).vpl_irradiance
-    runtime.capture(room_view("point", (96, 72)))
-    np.testing.assert_array_equal(runtime.capture(view).vpl_irradiance, first)
+    view, config = room_view("spot", (96, 72)), TunedConfig(quality=Quality(interleave=4))
+    runtime = Runtime(colored_room(), context=gl_context)
+    first = runtime.capture(view, config).vpl_irradiance
+    runtime.capture(room_view("point", (96, 72)), config)
+    np.testing.assert_array_equal(runtime.capture(view, config).vpl_irradiance, first)

@@ -5,6 +5,7 @@ import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.scene import Camera, look_at, scaled
@@ -15,11 +16,10 @@ PARAMETERS = ArtistParameters(intensity=1.3, falloff_footprint=0.8, extinction_c
 
 
 def mean_irradiance(gl_context, view: View, vpl_count=1024, rsm_resolution=512) -> float:
-    parameters = ArtistParameters(vpl_count=vpl_count)
-    runtime = Runtime(
-        colored_room(), TunedConfig(parameters), context=gl_context, rsm_resolution=rsm_resolution
+    config = TunedConfig(
+        ArtistParameters(vpl_count=vpl_count), quality=Quality(rsm_resolution=rsm_resolution)
     )
-    frames = [runtime.capture(view, rotation) for rotation in ROTATIONS]
+    frames = Runtime(colored_room(), context=gl_context).captures(view, config, ROTATIONS)
     return float(np.mean([frame.indirect_irradiance[frame.valid].mean() for frame in frames]))
 
 
@@ -56,14 +56,15 @@ def test_scale_changes_nothing(gl_context, light, factor):
     The bound is on the relative RMSE: where rounding moves a silhouette or a shadow's edge by a texel,
     single pixels may differ.
     """
-    view = room_view(light)
-    runtime = Runtime(colored_room(), TunedConfig(PARAMETERS), context=gl_context)
-    other = Runtime(scaled(colored_room(), factor), TunedConfig(PARAMETERS), context=gl_context)
-    image, grown = runtime.render_radiance(view), other.render_radiance(scaled_view(view, factor))
+    view, config = room_view(light), TunedConfig(PARAMETERS)
+    runtime = Runtime(colored_room(), context=gl_context)
+    other = Runtime(scaled(colored_room(), factor), context=gl_context)
+    image = runtime.render_radiance(view, config)
+    grown = other.render_radiance(scaled_view(view, factor), config)
     error = np.sqrt(np.mean((grown - image) ** 2) / np.mean(image**2))
     assert error < 1e-3
-    assert other.capture(scaled_view(view, factor)).scene_length == pytest.approx(
-        factor * runtime.capture(view).scene_length, rel=1e-3
+    assert other.capture(scaled_view(view, factor), config).scene_length == pytest.approx(
+        factor * runtime.capture(view, config).scene_length, rel=1e-3
     )
 
 
@@ -99,9 +100,9 @@ def _shader_files(folder):
 
 def test_frames_repeat_bitwise(gl_context):
     """The same view drawn twice, another in between, is the same to the last bit."""
-    runtime = Runtime(colored_room(), "default", context=gl_context)
-    first = runtime.capture(room_view("spot"))
-    runtime.capture(room_view("directional"))
-    again = runtime.capture(room_view("spot"))
+    runtime, config = Runtime(colored_room(), context=gl_context), TunedConfig()
+    first = runtime.capture(room_view("spot"), config)
+    runtime.capture(room_view("directional"), config)
+    again = runtime.capture(room_view("spot"), config)
     np.testing.assert_array_equal(again.indirect_irradiance, first.indirect_irradiance)
     np.testing.assert_array_equal(again.vpl_position_world, first.vpl_position_world)

@@ -7,6 +7,7 @@ import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
@@ -14,10 +15,12 @@ from vpltune.renderer.scene.scene import Camera, Light, Material, Texture, look_
 from vpltune.renderer.scene.views import View
 
 
-def runtime_with(scene, gl_context, filtering, resolution=256, **parameters) -> Runtime:
-    config = TunedConfig(ArtistParameters(**{**ArtistParameters().as_dict(), **parameters}))
-    options = RuntimeOptions(rsm_filtering=filtering)
-    return Runtime(scene, config, options, rsm_resolution=resolution, context=gl_context)
+def runtime_with(scene, gl_context, filtering) -> Runtime:
+    return Runtime(scene, RuntimeOptions(rsm_filtering=filtering), context=gl_context)
+
+
+def config_with(**parameters) -> TunedConfig:
+    return TunedConfig(ArtistParameters(**parameters), quality=Quality(rsm_resolution=256))
 
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
@@ -28,10 +31,9 @@ def test_filtering_keeps_energy(gl_context, light, density_exponent):
     Else tolerance 1 %: the estimate of 4,096 VPLs, whose flux then varies.
     """
     for filtering in (1, 5, 9):
-        runtime = runtime_with(
-            colored_room(), gl_context, filtering, vpl_count=4096, density_exponent=density_exponent
-        )
-        captured = runtime.capture(room_view(light, (8, 8)))
+        config = config_with(vpl_count=4096, density_exponent=density_exponent)
+        runtime = runtime_with(colored_room(), gl_context, filtering)
+        captured = runtime.capture(room_view(light, (8, 8)), config)
         if filtering == 1:
             expected = captured
         np.testing.assert_allclose(captured.vpl_flux.mean(), expected.vpl_flux.mean(), rtol=1e-2)
@@ -44,7 +46,8 @@ def test_filtering_keeps_energy(gl_context, light, density_exponent):
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_vpls_stand_on_surfaces(gl_context, light):
     """Every VPL lies on a plane of the room, to 1e-5 of its size, with that plane's normal."""
-    captured = runtime_with(colored_room(), gl_context, 5, vpl_count=2048).capture(room_view(light, (8, 8)))
+    runtime = runtime_with(colored_room(), gl_context, 5)
+    captured = runtime.capture(room_view(light, (8, 8)), config_with(vpl_count=2048))
     lit = captured.vpl_flux.sum(axis=1) > 0.0
     position, normal = captured.vpl_position_world[lit], captured.vpl_normal_world[lit]
     on_wall = np.abs(np.abs(position) - 1.0).min(axis=1) < 2e-5
@@ -73,9 +76,10 @@ def test_filtering_steadies_a_swept_light(gl_context):
     Uniform density, so that each VPL has the flux of what it sees; the wall alone is looked at.
     """
     camera = Camera(look_at(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, -1.0])), 0.6)
+    config = config_with(vpl_count=64, density_exponent=0.0)
     changes = {}
     for filtering in (1, 9):
-        runtime = runtime_with(speckled_floor(), gl_context, filtering, vpl_count=64, density_exponent=0.0)
+        runtime = runtime_with(speckled_floor(), gl_context, filtering)
         images = []
         for step in range(12):
             light = Light(
@@ -86,8 +90,7 @@ def test_filtering_steadies_a_swept_light(gl_context):
                 0.2,
                 0.5,
             )
-            images.append(
-                runtime.render(View("sweep", "fitted", (24, 24), camera, (light,)), "irradiance").copy()
-            )
+            view = View("sweep", "fitted", (24, 24), camera, (light,))
+            images.append(runtime.render(view, config, layer="irradiance"))
         changes[filtering] = np.abs(np.diff(images, axis=0)).mean()
     assert changes[9] < 0.5 * changes[1]

@@ -6,8 +6,9 @@ from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
 from scene_paths import OWN_SCENES
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
-from vpltune.renderer.frame.capture import read_image
+from vpltune.renderer.frame.capture import CapturedFrame, read_image
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.dynamic_lights import DynamicLights, point_lights
 from vpltune.renderer.scene.files import read_scene
@@ -21,12 +22,16 @@ from vpltune.tuner.reference import reference_views
 STRONG = {"falloff_footprint": 2.0, "screen_space_strength": 1.0}
 
 
-def runtime_of(gl_context, scene, **parameters) -> Runtime:
+def config_with(**parameters) -> TunedConfig:
     # What softening withholds has no occluders to it: neither shall what it is compared with.
-    config = TunedConfig(
-        ArtistParameters(**{**ArtistParameters().as_dict(), **parameters}), visibility="none"
+    return TunedConfig(
+        ArtistParameters(**parameters), visibility="transmittance", quality=Quality(rsm_resolution=512)
     )
-    return Runtime(scene, config, context=gl_context, rsm_resolution=512)
+
+
+def captured_corner(gl_context, view=None, **parameters) -> CapturedFrame:
+    runtime = Runtime(corner_scene(), context=gl_context)
+    return runtime.capture(view or corner_view(), config_with(**parameters))
 
 
 def corner_scene():
@@ -52,9 +57,7 @@ def mean_footprint(captured) -> float:
 
 
 def test_without_softening_there_is_nothing_to_give_back(gl_context):
-    captured = runtime_of(
-        gl_context, corner_scene(), falloff_footprint=0.0, screen_space_strength=1.0
-    ).capture(corner_view())
+    captured = captured_corner(gl_context, falloff_footprint=0.0, screen_space_strength=1.0)
     np.testing.assert_array_equal(captured.indirect_irradiance, captured.vpl_irradiance)
     assert captured.vpl_irradiance.any()
 
@@ -62,10 +65,8 @@ def test_without_softening_there_is_nothing_to_give_back(gl_context):
 def test_strength_scales_it_and_the_gather_is_untouched(gl_context):
     """Half the strength gives half the near field, to float32; the VPLs' part is bitwise the same."""
     views = [
-        runtime_of(gl_context, corner_scene(), falloff_footprint=2.0, screen_space_strength=s).capture(
-            corner_view()
-        )
-        for s in (0.0, 0.5, 1.0)
+        captured_corner(gl_context, falloff_footprint=2.0, screen_space_strength=strength)
+        for strength in (0.0, 0.5, 1.0)
     ]
     none, half, full = (view.indirect_irradiance - view.vpl_irradiance for view in views)
     assert not none.any()
@@ -83,11 +84,9 @@ def test_pixels_know_the_footprints_of_their_vpls(gl_context, light, density_exp
     radiosity comes through half floats.
     """
     view = room_view(light, (192, 144))
-    runtime = runtime_of(gl_context, colored_room(), density_exponent=density_exponent, **STRONG)
-    captured = runtime.capture(view)
-    (frame,) = runtime._frames.values()
-    with gl_context:
-        emitters = read_image(frame._screen_space_indirect._emitter_image)
+    config = config_with(density_exponent=density_exponent, **STRONG)
+    drawn = Runtime(colored_room(), context=gl_context).draw(view, config)
+    captured, emitters = drawn.capture(), read_image(drawn.frame.resources, "emitters")
     position = captured.vpl_position_world @ view.camera.world_to_camera[:3, :3].T
     position = position + view.camera.world_to_camera[:3, 3]
     focal = 0.5 * view.size[1] / np.tan(view.camera.yfov / 2.0)
@@ -113,12 +112,11 @@ def test_it_gives_back_what_softening_took(gl_context):
     3 pixels a tenth of the light there is missed, which comes from within one pixel.
     """
     parameters = ArtistParameters(falloff_footprint=2.0, screen_space_strength=1.0, vpl_count=64)
-    runtime = Runtime(corner_scene(), TunedConfig(parameters), context=gl_context, rsm_resolution=256)
-    view = corner_view()
-    captured = runtime.capture(view)
-    (frame,) = runtime._frames.values()
-    with gl_context:
-        truth = read_image(GatherFullRsm(gl_context, frame, 2).draw(view, parameters))[..., :3]
+    config = TunedConfig(parameters, quality=Quality(rsm_resolution=256))
+    drawn = Runtime(corner_scene(), context=gl_context).draw(corner_view(), config)
+    captured = drawn.capture()
+    gathered = GatherFullRsm(drawn.frame, 2).draw(drawn.inputs)
+    truth = read_image(gathered, "vpl_irradiance")[..., :3]
     reach = 2.0 * mean_footprint(captured)
     near = captured.valid & (captured.position_world[..., 1:] < reach).all(axis=2)
     near &= truth.min(axis=2) > 0.1 * truth[near].mean()
@@ -132,10 +130,9 @@ def test_it_gives_back_what_softening_took(gl_context):
 @pytest.mark.parametrize("factor", [0.01, 0.1, 10.0, 100.0])
 def test_scale_changes_nothing(gl_context, factor):
     """Scene, camera and light scaled together give the same near field, to 1e-3 of the image."""
-    view = corner_view()
-    near = runtime_of(gl_context, corner_scene(), **STRONG).capture(view).indirect_irradiance
-    other = runtime_of(gl_context, scaled(corner_scene(), factor), **STRONG)
-    grown = other.capture(scaled_view(view, factor)).indirect_irradiance
+    near = captured_corner(gl_context, **STRONG).indirect_irradiance
+    other = Runtime(scaled(corner_scene(), factor), context=gl_context)
+    grown = other.capture(scaled_view(corner_view(), factor), config_with(**STRONG)).indirect_irradiance
     assert np.sqrt(np.mean((grown - near) ** 2) / np.mean(near**2)) < 1e-3
 
 
@@ -143,7 +140,7 @@ def test_the_number_of_vpls_matters_less(gl_context):
     """From 4,096 VPLs down to 64, the near field keeps most of the energy that wider footprints withhold."""
     means = {}
     for count in (64, 4096):
-        captured = runtime_of(gl_context, corner_scene(), vpl_count=count, **STRONG).capture(corner_view())
+        captured = captured_corner(gl_context, vpl_count=count, **STRONG)
         means[count] = (captured.vpl_irradiance.mean(), captured.indirect_irradiance.mean())
     alone, together = (abs(means[64][i] / means[4096][i] - 1.0) for i in (0, 1))
     assert alone > 0.1
@@ -154,7 +151,7 @@ def test_the_image_size_matters_little(gl_context):
     """Four times the pixels: the near field's energy moves by less than 10 %, the image's by under 2 %."""
     means = []
     for size in ((160, 120), (320, 240)):
-        captured = runtime_of(gl_context, corner_scene(), vpl_count=64, **STRONG).capture(corner_view(size))
+        captured = captured_corner(gl_context, corner_view(size), vpl_count=64, **STRONG)
         seen = captured.valid
         means.append((captured.vpl_irradiance[seen].mean(), captured.indirect_irradiance[seen].mean()))
     (alone, together), (alone_fine, together_fine) = means
@@ -164,9 +161,11 @@ def test_the_image_size_matters_little(gl_context):
 
 def test_dynamic_lights_have_no_near_field(gl_context):
     """They cast no VPLs, so that nothing was withheld: the near field is the same with and without them."""
-    runtime = runtime_of(gl_context, corner_scene(), **STRONG)
+    runtime = Runtime(corner_scene(), context=gl_context)
     lights = DynamicLights(point_lights(np.array([[0.0, 0.5, 0.5]]), np.full(3, 3.0), 2.0))
-    plain, lit = runtime.capture(corner_view()), runtime.capture(corner_view(), lights=lights)
+    plain, lit = (
+        runtime.capture(corner_view(), config_with(**STRONG), lights=each) for each in (None, lights)
+    )
     assert lit.direct_irradiance.mean() > 1.2 * plain.direct_irradiance.mean()
     near, beside = (captured.indirect_irradiance - captured.vpl_irradiance for captured in (plain, lit))
     # Half floats hold the dynamic lights to 5e-4 of their own size.
@@ -174,10 +173,10 @@ def test_dynamic_lights_have_no_near_field(gl_context):
 
 
 def test_frames_repeat_bitwise(gl_context):
-    runtime = runtime_of(gl_context, corner_scene(), **STRONG)
-    first = runtime.capture(corner_view()).indirect_irradiance
-    runtime.capture(corner_view((64, 48)))
-    np.testing.assert_array_equal(runtime.capture(corner_view()).indirect_irradiance, first)
+    runtime, config = Runtime(corner_scene(), context=gl_context), config_with(**STRONG)
+    first = runtime.capture(corner_view(), config).indirect_irradiance
+    runtime.capture(corner_view((64, 48)), config)
+    np.testing.assert_array_equal(runtime.capture(corner_view(), config).indirect_irradiance, first)
 
 
 def contact_pixels(reference, reach: float) -> np.ndarray:
@@ -213,8 +212,8 @@ def test_contacts_come_nearer_to_the_reference(gl_context, path):
     camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
     view = View(path.stem, "fitted", (192, 144), camera, lights)
     (reference,) = reference_views(scene, (view,), noise_target=1e-3, max_samples=1024)
-    config = TunedConfig(ArtistParameters(**STRONG), visibility="none")
-    captured = Runtime(scene, config, context=gl_context).capture(view)
+    config = TunedConfig(ArtistParameters(**STRONG), visibility="transmittance")
+    captured = Runtime(scene, context=gl_context).capture(view, config)
     near = captured.valid & contact_pixels(reference, 2.0 * mean_footprint(captured))
     truth = reference.irradiance[near]
     alone, together = (

@@ -5,6 +5,7 @@ import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.views import View
@@ -16,15 +17,16 @@ ALL_KINDS = ("spot", "point", "directional")
 @pytest.fixture(scope="module")
 def captured(gl_context):
     """Captures of the room by names of lights; all with one RSM resolution, so that shadows are the same."""
-    config = TunedConfig(ArtistParameters(vpl_count=4096))
-    runtime = Runtime(colored_room(), config, context=gl_context, rsm_resolution=256)
+    config = TunedConfig(ArtistParameters(vpl_count=4096), quality=Quality(rsm_resolution=256))
+    runtime = Runtime(colored_room(), context=gl_context)
     made = {}
 
     def capture(*names):
         if names not in made:
             view = room_view(names[0], (48, 36))
             lights = tuple(ROOM_LIGHTS[name] for name in names)
-            made[names] = runtime.capture(View("lights", "fitted", view.size, view.camera, lights))
+            view = View("lights", "fitted", view.size, view.camera, lights)
+            made[names] = runtime.capture(view, config)
         return made[names]
 
     return capture

@@ -5,9 +5,9 @@ import pytest
 from built_scenes import colored_room, room_view
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
-from vpltune.renderer.frame.runtime_options import RuntimeOptions
 
 FRAMES = 16
 STEP = 0.03
@@ -29,16 +29,12 @@ def poses() -> list[np.ndarray]:
 
 def carried(gl_context, visibility: str, size: int = 24) -> np.ndarray:
     """Indirect irradiance, [frames, height, width, 3]; the light is a lamp that shines beside the board."""
-    runtime = Runtime(
-        colored_room(),
-        TunedConfig(PARAMETERS, visibility=visibility),
-        RuntimeOptions(visibility_map_size=size),
-        context=gl_context,
-    )
+    runtime = Runtime(colored_room(), context=gl_context)
+    config = TunedConfig(PARAMETERS, visibility=visibility, quality=Quality(map_size=size))
     images = []
     for placed in poses():
         runtime.scene_buffers.set_pose(placed, np.zeros((0, 4, 4)))
-        images.append(runtime.render(room_view("directional"), "irradiance"))
+        images.append(runtime.render(room_view("directional"), config, layer="irradiance"))
     return np.stack(images)
 
 
@@ -49,14 +45,16 @@ def with_maps(gl_context):
 
 def test_there_is_no_lag(gl_context, with_maps):
     """The last frame of the way is bitwise the image of a runtime that never saw the frames before it."""
-    runtime = Runtime(colored_room(), TunedConfig(PARAMETERS, visibility="maps"), context=gl_context)
+    runtime = Runtime(colored_room(), context=gl_context)
     runtime.scene_buffers.set_pose(poses()[-1], np.zeros((0, 4, 4)))
-    np.testing.assert_array_equal(runtime.render(room_view("directional"), "irradiance"), with_maps[-1])
+    config = TunedConfig(PARAMETERS, visibility="maps")
+    image = runtime.render(room_view("directional"), config, layer="irradiance")
+    np.testing.assert_array_equal(image, with_maps[-1])
 
 
 def test_the_shadow_goes_with_the_board(gl_context, with_maps):
     """The centre of what maps take away moves along with the board, by half of its way at least."""
-    without = carried(gl_context, "none")
+    without = carried(gl_context, "transmittance")
     taken = np.maximum(without - with_maps, 0.0).sum(axis=(1, 3))
     columns = np.arange(taken.shape[1])
     centers = (taken * columns).sum(axis=1) / taken.sum(axis=1)

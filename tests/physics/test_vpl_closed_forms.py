@@ -6,14 +6,15 @@ from built_scenes import quad, scene_of
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.capture import CapturedFrame
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.scene import Camera, Light, look_at
 from vpltune.renderer.scene.views import View
 
 
-def runtime_of(scene, gl_context, **parameters) -> Runtime:
-    config = TunedConfig(ArtistParameters(**{**ArtistParameters().as_dict(), **parameters}))
-    return Runtime(scene, config, context=gl_context)
+def captured_view(scene, gl_context, view, **parameters) -> CapturedFrame:
+    config = TunedConfig(ArtistParameters(**parameters))
+    return Runtime(scene, context=gl_context).capture(view, config)
 
 
 def center_mean(image: np.ndarray, half: int) -> np.ndarray:
@@ -33,10 +34,9 @@ def test_one_vpl_is_a_coaxial_disc(gl_context):
     floor = quad((-3, 0, -3), (0, 0, 6), (6, 0, 0), 0, "floor")
     light = Light("spot", np.full(3, 10.0), np.array([0.0, 1.0, 0.0]), np.array([0.0, 1.0, 0.0]), 0.1, 0.15)
     camera = Camera(look_at(np.array([0.0, 1.5, 0.001]), np.zeros(3)), 0.02)
-    runtime = runtime_of(
-        scene_of([ceiling, floor], [(0.5, 0.5, 0.5)]), gl_context, vpl_count=1, falloff_footprint=1.0
-    )
-    captured = runtime.capture(View("disc", "fitted", (8, 8), camera, (light,)))
+    scene = scene_of([ceiling, floor], [(0.5, 0.5, 0.5)])
+    view = View("disc", "fitted", (8, 8), camera, (light,))
+    captured = captured_view(scene, gl_context, view, vpl_count=1, falloff_footprint=1.0)
     to_vpl = captured.vpl_position_world[0] - captured.position_world
     distance_squared = (to_vpl**2).sum(axis=-1)
     # Floor and disc are parallel: both cosines are h/d.
@@ -58,9 +58,8 @@ def test_light_flux_is_all_accounted_for(gl_context):
     ]  # fmt: skip
     light = Light("point", np.array([3.0, 2.0, 1.0]), np.array([0.2, -0.1, 0.3]))
     camera = Camera(look_at(np.array([0.0, 0.0, 0.9]), np.zeros(3)), 1.0)
-    captured = runtime_of(scene_of(sides, [(0.5, 0.5, 0.5)]), gl_context).capture(
-        View("box", "fitted", (8, 8), camera, (light,))
-    )
+    view = View("box", "fitted", (8, 8), camera, (light,))
+    captured = captured_view(scene_of(sides, [(0.5, 0.5, 0.5)]), gl_context, view)
     np.testing.assert_allclose(captured.vpl_flux.sum(axis=0), 0.5 * 4.0 * np.pi * light.intensity, rtol=1e-3)
 
 
@@ -73,10 +72,8 @@ def test_sun_flux_is_irradiance_times_area(gl_context):
         direction = np.array([np.sin(tilt), -np.cos(tilt), 0.0])
         light = Light("directional", np.full(3, 2.0), direction_world=direction)
         camera = Camera(look_at(np.array([0.0, 3.0, 0.0]), np.zeros(3)), 1.0)
-        runtime = runtime_of(
-            scene_of([quad((-1, 0, -1), (0, 0, 2), (2, 0, 0))], [(0.5, 0.5, 0.5)]), gl_context
-        )
-        captured = runtime.capture(View("sun", "fitted", (8, 8), camera, (light,)))
+        scene = scene_of([quad((-1, 0, -1), (0, 0, 2), (2, 0, 0))], [(0.5, 0.5, 0.5)])
+        captured = captured_view(scene, gl_context, View("sun", "fitted", (8, 8), camera, (light,)))
         np.testing.assert_allclose(captured.vpl_flux.sum(axis=0), 2.0 * 4.0 * np.cos(tilt) * 0.5, rtol=5e-3)
 
 
@@ -103,10 +100,9 @@ def test_floor_beside_an_evenly_lit_wall(gl_context, distance):
     light = Light("directional", np.full(3, 4.0), direction_world=np.array([0.0, 0.0, -1.0]))
     target = np.array([0.0, 0.0, distance])
     camera = Camera(look_at(target + np.array([0.0, 0.8, 0.0]), target), 0.01)
-    runtime = runtime_of(
-        scene_of([wall, floor], [(0.8, 0.8, 0.8), (0.5, 0.5, 0.5)]), gl_context, vpl_count=4096
-    )
-    captured = runtime.capture(View("corner", "fitted", (8, 8), camera, (light,)))
+    scene = scene_of([wall, floor], [(0.8, 0.8, 0.8), (0.5, 0.5, 0.5)])
+    view = View("corner", "fitted", (8, 8), camera, (light,))
+    captured = captured_view(scene, gl_context, view, vpl_count=4096)
     radiosity = 0.8 * 4.0
     expected = radiosity * corner_form_factor(distance, 1.0, 1.0)
     np.testing.assert_allclose(center_mean(captured.indirect_irradiance, 4), expected, rtol=1e-2)
@@ -133,8 +129,8 @@ def test_white_furnace(gl_context, parameters):
     light = Light("point", np.full(3, 1.0), np.zeros(3))
     # From the centre a 90° view covers one wall exactly; a pixel's share of it goes with 1/cos⁴.
     camera = Camera(look_at(np.zeros(3), np.array([0.0, 0.0, -1.0])), float(np.pi / 2.0))
-    runtime = runtime_of(scene_of(sides, [(1.0, 1.0, 1.0)]), gl_context, **parameters)
-    captured = runtime.capture(View("furnace", "fitted", (64, 64), camera, (light,)))
+    view = View("furnace", "fitted", (64, 64), camera, (light,))
+    captured = captured_view(scene_of(sides, [(1.0, 1.0, 1.0)]), gl_context, view, **parameters)
     # Pixels of a pinhole image cover equal areas of a plane square to its axis.
     mean = captured.indirect_irradiance.mean(axis=(0, 1))
     np.testing.assert_allclose(mean, 4.0 * np.pi / 24.0, rtol=2e-2)
@@ -145,9 +141,8 @@ def test_direct_light_is_inverse_square(gl_context):
     floor = quad((-3, 0, -3), (0, 0, 6), (6, 0, 0))
     light = Light("spot", np.full(3, 5.0), np.array([0.0, 2.0, 0.0]), np.array([0.0, -1.0, 0.0]), 0.6, 0.8)
     camera = Camera(look_at(np.array([0.0, 1.0, 0.0]), np.zeros(3)), 0.8)
-    captured = runtime_of(scene_of([floor], [(0.5, 0.5, 0.5)]), gl_context).capture(
-        View("spot", "fitted", (33, 33), camera, (light,))
-    )
+    view = View("spot", "fitted", (33, 33), camera, (light,))
+    captured = captured_view(scene_of([floor], [(0.5, 0.5, 0.5)]), gl_context, view)
     offset = captured.position_world - light.position_world
     distance = np.linalg.norm(offset, axis=-1)
     expected = 5.0 * (2.0 / distance) / distance**2
@@ -159,9 +154,9 @@ def test_empty_scene_view_and_dark_scene(gl_context):
     floor = quad((-1, 0, -1), (0, 0, 2), (2, 0, 0))
     away = Light("spot", np.full(3, 5.0), np.array([0.0, 2.0, 0.0]), np.array([0.0, 1.0, 0.0]), 0.1, 0.5)
     camera = Camera(look_at(np.array([0.0, 1.0, 0.0]), np.zeros(3)), 0.8)
-    runtime = runtime_of(scene_of([floor], [(0.5, 0.5, 0.5)]), gl_context)
+    runtime = Runtime(scene_of([floor], [(0.5, 0.5, 0.5)]), context=gl_context)
     for lights in ((), (away,)):
-        captured = runtime.capture(View("dark", "fitted", (8, 8), camera, lights))
+        captured = runtime.capture(View("dark", "fitted", (8, 8), camera, lights), TunedConfig())
         assert captured.valid.all()
         assert not captured.indirect_irradiance.any()
         assert not captured.direct_irradiance.any()

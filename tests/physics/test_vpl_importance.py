@@ -6,122 +6,122 @@ from built_scenes import ROOM_LIGHTS, colored_room, room_view
 from converged_views import corner_view
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.scene import Camera, look_at, scaled
 from vpltune.renderer.scene.views import View, scaled_view
 
 
-def runtime_with(gl_context, scene=None, resolution=256, **parameters) -> Runtime:
-    config = TunedConfig(ArtistParameters(**{**ArtistParameters().as_dict(), **parameters}))
-    return Runtime(scene or colored_room(), config, rsm_resolution=resolution, context=gl_context)
+def config_with(**parameters) -> TunedConfig:
+    return TunedConfig(ArtistParameters(**parameters), quality=Quality(rsm_resolution=256))
 
 
-def irradiances(runtime: Runtime, view: View, rotations: int) -> np.ndarray:
-    random = np.random.default_rng(3)
-    frames = [runtime.capture(view, tuple(random.random(2))) for _ in range(rotations)]
+@pytest.fixture(scope="module")
+def room(gl_context) -> Runtime:
+    return Runtime(colored_room(), context=gl_context)
+
+
+def irradiances(runtime: Runtime, view: View, config: TunedConfig, rotations: int) -> np.ndarray:
+    shifts = [(float(u), float(v)) for u, v in np.random.default_rng(3).random((rotations, 2))]
+    frames = runtime.captures(view, config, shifts)
     return np.array([frame.indirect_irradiance[frame.valid] for frame in frames], np.float64)
 
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 @pytest.mark.parametrize("density_importance", [pytest.param(0.5, marks=pytest.mark.slow), pytest.param(1.0)])
-def test_the_mean_over_rotations_is_the_same_light(gl_context, light, density_importance):
+def test_the_mean_over_rotations_is_the_same_light(room, light, density_importance):
     """48 rotations of 256 VPLs give the image of 32,768: mean within 1 %, the middle pixel within 1.5 %.
 
     α is small, so that footprints, which depend on density, take little light away; pixels in corners, where
     1/d² then runs free, are noisy (RMS over all of them 2 to 16 %), so the middle one is looked at.
     """
     view = corner_view(light)
-    truth = irradiances(runtime_with(gl_context, vpl_count=32768, falloff_footprint=0.05), view, 1)[0]
-    runtime = runtime_with(
-        gl_context, vpl_count=256, falloff_footprint=0.05, density_importance=density_importance
-    )
-    mean = irradiances(runtime, view, 48).mean(axis=0)
+    truth = irradiances(room, view, config_with(vpl_count=32768, falloff_footprint=0.05), 1)[0]
+    config = config_with(vpl_count=256, falloff_footprint=0.05, density_importance=density_importance)
+    mean = irradiances(room, view, config, 48).mean(axis=0)
     assert mean.mean() == pytest.approx(truth.mean(), rel=1e-2)
     seen = truth > 0.0
     assert np.median(np.abs(mean[seen] - truth[seen]) / truth[seen]) < 1.5e-2
 
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
-def test_less_noise_where_the_camera_looks(gl_context, light):
+def test_less_noise_where_the_camera_looks(room, light):
     """At equal count, relative variance over rotations falls: near a corner by a third at least."""
     view = corner_view(light)
     variance = {}
     for density_importance in (0.0, 1.0):
-        runtime = runtime_with(gl_context, vpl_count=64, density_importance=density_importance)
-        images = irradiances(runtime, view, 24)
+        config = config_with(vpl_count=64, density_importance=density_importance)
+        images = irradiances(room, view, config, 24)
         mean = images.mean(axis=0)
         variance[density_importance] = np.mean(images.var(axis=0) / (mean**2 + 0.01 * mean.mean() ** 2))
     assert variance[1.0] < 0.67 * variance[0.0], variance
 
 
-def test_places_that_see_nothing_say_nothing(gl_context):
+def test_places_that_see_nothing_say_nothing(room):
     """Where most of the image is sky, importance still comes from the rest of it."""
-    runtime = runtime_with(gl_context, vpl_count=64, density_importance=1.0)
     camera = Camera(look_at(np.array([-1.0, 0.5, 8.0]), np.array([0.9, -0.7, -1.0])), 0.6)
-    frame = runtime._draw(View("past", "fitted", (48, 36), camera, (ROOM_LIGHTS["spot"],)))
-    factor = np.frombuffer(frame._vpl_importance.factor.read(), np.float32)
+    view = View("past", "fitted", (48, 36), camera, (ROOM_LIGHTS["spot"],))
+    drawn = room.draw(view, config_with(vpl_count=64, density_importance=1.0))
+    factor = np.frombuffer(drawn.frame.resources.read("vpl_importance"), np.float32)
     assert np.isfinite(factor).all()
     assert factor.max() > 2.0 * factor[factor > 0.06].min()
 
 
 @pytest.mark.parametrize("factor", [0.01, 100.0])
-def test_importance_has_no_unit(gl_context, factor):
+def test_importance_has_no_unit(gl_context, room, factor):
     """Scene, camera and light scaled together: the same VPLs, to 1e-3 relative RMSE of the image."""
     view = room_view("spot", (32, 24))
-    chosen = {"vpl_count": 64, "density_importance": 1.0}
-    image = runtime_with(gl_context, **chosen).render_radiance(view)
-    other = runtime_with(gl_context, scaled(colored_room(), factor), **chosen)
-    grown = other.render_radiance(scaled_view(view, factor))
+    config = config_with(vpl_count=64, density_importance=1.0)
+    image = room.render_radiance(view, config)
+    other = Runtime(scaled(colored_room(), factor), context=gl_context)
+    grown = other.render_radiance(scaled_view(view, factor), config)
     assert np.sqrt(np.mean((grown - image) ** 2) / np.mean(image**2)) < 1e-3
 
 
 @pytest.mark.parametrize("lloyd_iterations", [0, 4])
-def test_many_rotations_of_one_view_are_bitwise_those_of_one_frame_each(gl_context, lloyd_iterations):
+def test_many_rotations_of_one_view_are_bitwise_those_of_one_frame_each(room, lloyd_iterations):
     """What does not depend on the rotation is drawn once, and nothing of one rotation is left in the next."""
     options = {"vpl_count": 64, "density_importance": 0.7, "screen_space_strength": 1.0}
-    runtime = runtime_with(gl_context, **options, lloyd_iterations=lloyd_iterations)
+    config = config_with(**options, lloyd_iterations=lloyd_iterations)
     view, rotations = corner_view("spot"), ((0.0, 0.0), (0.3, 0.7), (0.9, 0.1))
-    for rotation, captured in zip(rotations, runtime.captures(view, rotations), strict=True):
-        alone = runtime.capture(view, rotation)
+    for rotation, captured in zip(rotations, room.captures(view, config, rotations), strict=True):
+        alone = room.capture(view, config, table_rotation=rotation)
         for name in ("vpl_position_world", "vpl_flux", "direct_irradiance", "indirect_irradiance"):
             assert np.array_equal(getattr(captured, name), getattr(alone, name)), name
 
 
 @pytest.mark.parametrize("lloyd_iterations", [0, 4])
-def test_frames_repeat_bitwise(gl_context, lloyd_iterations):
-    runtime = runtime_with(
-        gl_context, vpl_count=64, density_importance=0.7, lloyd_iterations=lloyd_iterations
-    )
-    first = runtime.capture(room_view("point", (32, 24)))
-    runtime.capture(room_view("spot", (32, 24)))
-    again = runtime.capture(room_view("point", (32, 24)))
+def test_frames_repeat_bitwise(room, lloyd_iterations):
+    config = config_with(vpl_count=64, density_importance=0.7, lloyd_iterations=lloyd_iterations)
+    first = room.capture(room_view("point", (32, 24)), config)
+    room.capture(room_view("spot", (32, 24)), config)
+    again = room.capture(room_view("point", (32, 24)), config)
     np.testing.assert_array_equal(again.vpl_position_world, first.vpl_position_world)
     np.testing.assert_array_equal(again.indirect_irradiance, first.indirect_irradiance)
 
 
-def test_a_dark_view_is_no_error(gl_context):
+def test_a_dark_view_is_no_error(room):
     """No light, or nothing seen: finite, and black."""
-    runtime = runtime_with(gl_context, vpl_count=64, density_importance=1.0)
-    assert not runtime.capture(room_view(None, (16, 12))).indirect_irradiance.any()
+    config = config_with(vpl_count=64, density_importance=1.0)
+    assert not room.capture(room_view(None, (16, 12)), config).indirect_irradiance.any()
     away = Camera(look_at(np.array([0.0, 0.0, 5.0]), np.array([0.0, 0.0, 9.0])), 0.5)
-    frame = runtime.capture(View("away", "fitted", (16, 12), away, (ROOM_LIGHTS["spot"],)))
+    frame = room.capture(View("away", "fitted", (16, 12), away, (ROOM_LIGHTS["spot"],)), config)
     assert np.isfinite(frame.vpl_flux).all()
 
 
-def test_near_field_follows_importance(gl_context):
+def test_near_field_follows_importance(room):
     """The screen-space term knows the footprints that VPLs have: energy stays with and without importance.
 
     Within 4 %: it gives back what softened VPLs withhold, from the screen and filtered.
     """
     view = corner_view("spot", (64, 48))
-    truth = irradiances(runtime_with(gl_context, vpl_count=16384, falloff_footprint=0.1), view, 1)[0].mean()
+    truth = irradiances(room, view, config_with(vpl_count=16384, falloff_footprint=0.1), 1)[0].mean()
     for density_importance in (0.0, 1.0):
-        runtime = runtime_with(
-            gl_context,
+        config = config_with(
             vpl_count=256,
             falloff_footprint=1.0,
             density_importance=density_importance,
             screen_space_strength=1.0,
         )
-        assert irradiances(runtime, view, 16).mean() == pytest.approx(truth, rel=4e-2), density_importance
+        assert irradiances(room, view, config, 16).mean() == pytest.approx(truth, rel=4e-2)

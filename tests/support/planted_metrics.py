@@ -30,7 +30,7 @@ PLANTED = {
         "predicted_milliseconds": 3.5,
         "relmse": 0.15,
         "vpl_count": 200,
-        "choice": {"interleave": 4, "visibility": "maps"},
+        "choice": {"interleave": 4, "map_size": 16, "rsm_resolution": 512},
         "tries": 2,
     },
     "pareto": [

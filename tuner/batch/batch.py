@@ -3,7 +3,7 @@
 import contextlib
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +23,7 @@ from vpltune.tuner.batch.tensorboard_log import fit_curves
 from vpltune.tuner.reference.cache import remove_leftovers
 
 Event = dict[str, Any]
-Scheduler = Callable[[Sequence[Job]], Iterator[Event]]
+Scheduler = Callable[[Sequence[Job]], Generator[Event, None, None]]
 """Starts the jobs in the given order and yields events. Every job ends with a `record` event."""
 
 

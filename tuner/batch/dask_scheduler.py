@@ -8,7 +8,7 @@ import itertools
 import time
 import uuid
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -35,7 +35,9 @@ MOST_AT_ONCE = 4096
 Event = dict[str, Any]
 
 
-def tune_on_dask(jobs: Sequence[Job], address: str, threads: int, limits: Limits) -> Iterator[Event]:
+def tune_on_dask(
+    jobs: Sequence[Job], address: str, threads: int, limits: Limits
+) -> Generator[Event, None, None]:
     """Tune `jobs`, roughly in the given order, on the workers of the Dask scheduler at `address`.
 
     Yields events; every job ends with a `record` event.
@@ -109,7 +111,8 @@ class _Crew:
             return
         self._asked = now
         try:
-            count = sum(self._client.nthreads().values())
+            threads: Any = self._client.nthreads()  # a dict: the client is a synchronous one
+            count = sum(threads.values())
         except (OSError, TimeoutError):
             return  # the connection is about to be lost
         if count != self._count:

@@ -4,9 +4,9 @@ import dataclasses
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from vpltune.renderer.files.atomic_file import write_text_whole
 
@@ -35,7 +35,7 @@ class JobOptions:
     """Start of the fit: the text of a config file."""
     views: int = 4
     seed: int = 0
-    bounces: str = "1"
+    bounces: Literal["1", "all"] = "1"
     size: tuple[int, int] | None = None
     """Width and height of the views in pixels; None for the default of a fit."""
 
@@ -48,11 +48,11 @@ class JobOptions:
         from vpltune.renderer.config.tuned_config import parse_config
         from vpltune.tuner.scene_fit.fit_scene import FitOptions
 
-        size = {} if self.size is None else {"size": self.size}
         start = parse_config(self.start, "the start of the fit")
-        return FitOptions(
-            start=start, views=self.views, seed=self.seed, bounces=self.bounces, command=command, **size
+        options = FitOptions(
+            start=start, views=self.views, seed=self.seed, bounces=self.bounces, command=command
         )
+        return options if self.size is None else replace(options, size=self.size)
 
 
 @dataclass(frozen=True)

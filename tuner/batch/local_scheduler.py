@@ -2,7 +2,7 @@
 
 import queue
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -16,7 +16,9 @@ BUSY_SECONDS = 1.0
 Event = dict[str, Any]
 
 
-def tune_locally(jobs: Sequence[Job], workers: int, threads: int, limits: Limits) -> Iterator[Event]:
+def tune_locally(
+    jobs: Sequence[Job], workers: int, threads: int, limits: Limits
+) -> Generator[Event, None, None]:
     """Tune `jobs`, started in the given order, and yield events. Every job ends with a `record` event.
 
     If the iterator is closed early or raises, every process that it started is ended.

@@ -8,7 +8,7 @@ import sys
 import threading
 import time
 import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -80,7 +80,7 @@ class TuneShare(submitit.helpers.Checkpointable):
 
 def tune_on_slurm(
     jobs: Sequence[Job], options: dict[str, Any], workers: int, threads: int, limits: Limits
-) -> Iterator[Event]:
+) -> Generator[Event, None, None]:
     """Tune `jobs` in arrays of at most `workers` tasks, and yield events.
 
     Every job ends with a `record` event. If the iterator is closed early, every task is cancelled.

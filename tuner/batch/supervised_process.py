@@ -130,7 +130,8 @@ class SupervisedProcess:
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
         self._connection.close()
-        self._process.stdin.close()
+        if self._process.stdin is not None:
+            self._process.stdin.close()
         self._words.close()
         self._process = None
 
@@ -158,6 +159,7 @@ class SupervisedProcess:
             StoppedError: the batch was stopped.
             EOFError, OSError: the process died.
         """
+        assert self._process is not None
         process = psutil.Process(self._process.pid)
         looked = 0.0
         while True:

@@ -82,7 +82,7 @@ def _images_and_targets(falloff: FalloffParameters, data: Data) -> tuple[Array, 
 def _projected(images: Array, targets: Array) -> Float[Array, ""]:
     """The k in its range that minimises |k·images − targets|²."""
     product = partial(jnp.matmul, precision=jax.lax.Precision.HIGHEST)
-    # 1e-30: without light every k is equally good, and 0/0 is not.
+    # 1e-30: without light, every k is equally good, but 0/0 would give NaN.
     best = product(images, targets) / jnp.maximum(product(images, images), 1e-30)
     return jnp.clip(best, _INTENSITY.low, _INTENSITY.high)
 

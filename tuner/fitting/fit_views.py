@@ -51,7 +51,7 @@ class ViewPixels:
     overlap: Float[Array, "receivers vpls"] | None
     """From the visibility maps (`tuner.surrogate.vpl_visibility.surface_overlap`); None without maps."""
     visibility: Visibility | None
-    """Share of each VPL's light that reaches each receiver, in [0, 1], where it is known without maps."""
+    """Share of each VPL's light that reaches each receiver, in [0, 1], if it was given in place of maps."""
     half_a: Float32[np.ndarray, "receivers 3"]
     half_b: Float32[np.ndarray, "receivers 3"]
     """Indirect irradiance by the two halves of the reference [W/m²]."""

@@ -108,12 +108,11 @@ def _view(
     vpls = _lit_patch(random, half_size)
     image = np.asarray(_gather(receivers, vpls, FalloffParameters.of(planted)))
     image = image * np.exp(misfit * _smooth_field(random).reshape(-1, 1))
-    halves = [
+    half_a, half_b = (
         np.maximum(image * (1.0 + noise * random.standard_normal(image.shape)), 0.0).astype(np.float32)
         for _ in range(2)
-    ]
-    pixels = np.arange(SIZE[0] * SIZE[1])
-    return fit_view(receivers, vpls, None, *halves, pixels, SIZE)
+    )
+    return fit_view(receivers, vpls, None, half_a, half_b, np.arange(SIZE[0] * SIZE[1]), SIZE)
 
 
 def _seen(random: np.random.Generator, half_size: Float[np.ndarray, "3"]) -> Receivers:
@@ -155,7 +154,12 @@ def _lit_patch(random: np.random.Generator, half_size: Float[np.ndarray, "3"]) -
     area = 1.0 + 2.0 * (reach / radius) ** 2
     footprint = radius * np.sqrt(area / area.sum())
     flux = random.uniform(0.2, 1.0, 3)[None, :] * np.ones((VPLS, 1)) / VPLS
-    return VirtualPointLights(*(jnp.asarray(v, jnp.float32) for v in (position, normal, footprint, flux)))
+    return VirtualPointLights(
+        jnp.asarray(position, jnp.float32),
+        jnp.asarray(normal, jnp.float32),
+        jnp.asarray(footprint, jnp.float32),
+        jnp.asarray(flux, jnp.float32),
+    )
 
 
 def _smooth_field(random: np.random.Generator) -> Float[np.ndarray, "height width"]:

@@ -10,11 +10,10 @@ from vpltune.renderer.config.tuned_config import TunedConfig, write_config
 from vpltune.renderer.files.atomic_file import write_text_whole, written_whole
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene
 from vpltune.tuner.fitting.fit_status import Descent
-from vpltune.tuner.frame_time.frame_budget import BudgetFit, FrameBudget
+from vpltune.tuner.frame_time.frame_budget import CHOICES, BudgetFit, FrameBudget
 from vpltune.tuner.frame_time.pareto_front import fit_front
 
 _COLUMNS = ("milliseconds", "relmse", "vpl_count")
-_CHOICES = ("interleave", "map_size", "rsm_resolution")
 
 
 @dataclass(frozen=True)
@@ -103,9 +102,9 @@ def write_front(
         write_config(output / name, replace(point.config(start), provenance=provenance, fit=None))
         document = {"frame_size": list(frame_size), **point.document()}
         rows.append({**document, "parameters": point.parameters.as_dict(), "config": name})
-    lines = [",".join((*_COLUMNS, *_CHOICES, "config"))]
+    lines = [",".join((*_COLUMNS, *CHOICES, "config"))]
     for row in rows:
-        cells = [f"{row[name]:.6g}" for name in _COLUMNS] + [str(row["choice"][name]) for name in _CHOICES]
+        cells = [f"{row[name]:.6g}" for name in _COLUMNS] + [str(row["choice"][name]) for name in CHOICES]
         lines.append(",".join((*cells, row["config"])))
     write_text_whole(output / "pareto.csv", "\n".join(lines) + "\n")
     write_plot(output / "pareto.png", points)
@@ -128,7 +127,7 @@ def write_plot(path: Path, points: Sequence[BudgetFit]) -> None:
     axes.loglog(milliseconds, errors, "o-")
     for x, y, point in zip(milliseconds, errors, points, strict=True):
         axes.annotate(f" {point.frame.vpl_count} VPLs", (x, y), va="bottom")
-    axes.set(xlabel="frame [ms]", ylabel="relMSE on rotations not fitted to")
+    axes.set(xlabel="frame time [ms]", ylabel="relMSE on held-out rotations")
     axes.margins(x=0.15)
     axes.grid(which="both", alpha=0.3)
     with written_whole(path) as temporary:

@@ -4,7 +4,7 @@ import hashlib
 import importlib.metadata
 import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -59,6 +59,8 @@ SHADOW_SHARE = 0.25
 half, more time went to a finer RSM alone, and the indirect light was worse than with less."""
 LEAST_COUNT = 4
 """VPLs for each pixel of a block, below which a budget counts as too small. A choice."""
+CHOICES = ("interleave", "map_size", "rsm_resolution")
+"""Quality settings that a budget chooses."""
 CHOICE_ROTATIONS = 3
 """Rotations of the point table that the quality settings are compared on. A choice."""
 GUESSED_IMPORTANCE = 0.75
@@ -113,7 +115,7 @@ class BudgetFit:
             "predicted_milliseconds": self.predicted,
             "relmse": self.relmse,
             "vpl_count": self.frame.vpl_count,
-            "choice": asdict(self.frame.choice),
+            "choice": {name: getattr(self.frame.choice, name) for name in CHOICES},
             "tries": self.frame.tries,
         }
 

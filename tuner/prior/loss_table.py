@@ -153,7 +153,7 @@ def _interpolated(table: LossTable, point: Array) -> tuple[Array, Array]:
         strict=True,
     )
 
-    def at(values: Array) -> Array:
+    def at(values: Array | np.ndarray) -> Array:
         near = jax.lax.dynamic_slice(values, starts, (4, 2, 2))
         return jnp.einsum("abc,a,b,c->", near, *weights, precision=jax.lax.Precision.HIGHEST)
 

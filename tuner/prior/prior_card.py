@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vpltune.renderer.config.artist_parameters import parameter_spec
-from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS, value_at
+from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS
 from vpltune.renderer.config.scene_statistics import STATISTIC_NAMES
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.tuner.prior.prior_library import FITTED, HELD_OUT, VIEW_SIZE
@@ -118,7 +118,7 @@ def _ranges(learnt: "LearntPrior") -> str:
     lines = []
     for index, name in enumerate(AUTO_PARAMETERS):
         spec = parameter_spec(name)
-        low, high = (value_at(spec, ends[index]) for ends in (learnt.prior.lowest, learnt.prior.highest))
+        low, high = (spec.value_at(ends[index]) for ends in (learnt.prior.lowest, learnt.prior.highest))
         lines.append(f"- {spec.symbol} ({name}): {low:.3g} to {high:.3g}")
     return "\n".join(lines)
 

@@ -55,7 +55,7 @@ not learn the noise of a single placement."""
 
 CAPTURE_VERSION = 3
 """Increase it whenever a code change gives other statistics or losses for the same scene. Old cache entries
-are then ignored. The runtime's options and the layout of the maps are in the key anyway."""
+are then ignored. Runtime options, quality and the layout of the maps are in the key anyway."""
 
 
 _TABLES = ("table", "relmse_table")  # fields of PriorScene that are loss tables
@@ -140,13 +140,18 @@ def _captured(
                 relmse_tables.append(loss_table(captured, parameters, seed=0, robust=False))
                 counts.append(vpl_count)
                 fitted.append(view.split == "fitted")
-    stacked = (
-        LossTable(*(np.stack([getattr(table, part) for table in of_rows]) for part in _TABLE_PARTS))
-        for of_rows in (tables, relmse_tables)
-    )
     return PriorScene(
-        scene.name, np.stack(statistics), *stacked, np.array(counts, np.int32), np.array(fitted)
+        scene.name,
+        np.stack(statistics),
+        _stacked(tables),
+        _stacked(relmse_tables),
+        np.array(counts, np.int32),
+        np.array(fitted),
     )
+
+
+def _stacked(tables: list[LossTable]) -> LossTable:
+    return LossTable(**{part: np.stack([getattr(table, part) for table in tables]) for part in _TABLE_PARTS})
 
 
 def _key(scene: Scene, views: tuple[View, ...]) -> str:
@@ -157,7 +162,11 @@ def _key(scene: Scene, views: tuple[View, ...]) -> str:
         "captures": [CAPTURE_VERSION, list(ROTATIONS.items()), NOISE_TARGET, MAX_SAMPLES, RSM_RESOLUTION],
         "statistics": STATISTIC_NAMES,
         "parameters": ArtistParameters().as_dict(),
-        "runtime": [asdict(DEFAULT_OPTIONS), VisibilityMapLayout.of(CONFIG).defines],
+        "runtime": [
+            asdict(DEFAULT_OPTIONS),
+            CONFIG.quality.as_dict(),
+            VisibilityMapLayout.of(CONFIG).defines,
+        ],
         "axes": [[spec.low, spec.high, spec.scale] for spec in axes],
         "nodes": [FOOTPRINT_PLACES, BIAS_PLACES, SOFTNESS_PLACES, RECEIVERS],
     }

@@ -139,7 +139,7 @@ def train(rows: TrainingRows, left_out: Bool[np.ndarray, "folds scenes"]) -> tup
         lambda out: _trained(rows, out, normalised), jnp.asarray(left_out), batch_size=FOLDS
     )
     return tuple(
-        _folded(jax.tree.map(lambda values, i=i: np.asarray(values[i], np.float64), weights), center, spread)
+        _folded({name: np.asarray(values[i], np.float64) for name, values in weights.items()}, center, spread)
         for i in range(len(left_out))
     )
 
@@ -148,7 +148,7 @@ def prior_points(
     weights: Weights, statistics: Float[Array, "rows statistics"]
 ) -> Float[Array, "rows parameters"]:
     """The model before clamping: points in the unit cube, from statistics with mean 0 and deviation 1."""
-    return DEFAULT + REACH * (statistics @ weights["weights"].T + weights["bias"])
+    return (statistics @ weights["weights"].T + weights["bias"]) * REACH + DEFAULT
 
 
 def _objective(

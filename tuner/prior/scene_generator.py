@@ -208,7 +208,8 @@ def _furnish(builder: _Builder, low: np.ndarray, high: np.ndarray) -> None:
             reach,
         )
         if builder.free(place, reach):
-            piece = random.choice([_crate, _table, _shelf, _board])
+            pieces = (_crate, _table, _shelf, _board)
+            piece = pieces[random.choice(len(pieces))]
             piece(builder, place, reach, high[1], random.uniform(0.0, math.pi))
 
 

@@ -1,8 +1,13 @@
 """Ground truth for a fit: one bounce of indirect light, path-traced with Mitsuba."""
 
+from typing import TYPE_CHECKING
+
 from vpltune.tuner.reference.reference_view import ReferenceView, noise_floor
 from vpltune.tuner.reference.references import reference_views
 from vpltune.tuner.reference.variant import MitsubaVariant, describe_variant
+
+if TYPE_CHECKING:
+    from vpltune.tuner.reference.visibility import ray_traced_visibility
 
 __all__ = [
     "MitsubaVariant",

@@ -9,6 +9,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import platformdirs
@@ -62,7 +63,9 @@ def store(key: str, reference: ReferenceView) -> None:
     A folder that cannot be written to is logged as a warning; it raises nothing.
     """
     global _stored_bytes
-    arrays = {field.name: np.asarray(getattr(reference, field.name)) for field in fields(reference)}
+    arrays: dict[str, Any] = {
+        field.name: np.asarray(getattr(reference, field.name)) for field in fields(reference)
+    }
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)
     payload = buffer.getvalue()

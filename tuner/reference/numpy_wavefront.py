@@ -67,7 +67,8 @@ class NumpyWavefront:
         blocked = np.zeros(direction.shape[1], bool)
         limits = np.broadcast_to(max_t, blocked.shape)
         for lane, ray in self._rays(origin, direction, active):
-            ray.maxt = float(limits[lane])
+            # Mitsuba's type stubs are those of its vectorised variants.
+            ray.maxt = float(limits[lane])  # pyright: ignore[reportAttributeAccessIssue]
             blocked[lane] = self._scene.ray_test(ray, coherent=False, active=True)
         return blocked
 

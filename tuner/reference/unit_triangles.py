@@ -131,7 +131,7 @@ def _packed_textures(
     scene: Scene,
 ) -> tuple[UInt32[np.ndarray, "textures 5"], UInt32[np.ndarray, " texels"]]:
     rows = [(0, 1, 1, 0, 0)]
-    texels = [np.array([0xFFFFFF], np.uint32)]
+    texels: list[np.ndarray] = [np.array([0xFFFFFF], np.uint32)]
     first = 1
     for texture in scene.textures:
         height, width, _ = texture.texels_srgb.shape

@@ -100,6 +100,7 @@ def _chosen_variant(forced: str | None, named_library: str | None) -> MitsubaVar
     if forced:
         raise InputError(f"VPLTUNE_MITSUBA_VARIANT: must be llvm_ad_rgb or scalar_rgb, got {forced!r}")
     # None comes last: Dr.Jit searches by itself and may know places that we do not.
+    libraries: list[str | None]
     libraries = [named_library] if named_library else [*map(str, llvm_libraries()[:LIBRARIES_TRIED]), None]
     path = cache_folder() / "mitsuba_variant.json"
     key = _machine_key(libraries)

@@ -1,6 +1,7 @@
 """Read the output folder of a fit. It may come from another version, or be incomplete."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,12 @@ IMAGES = "images.npz"
 """File with the linear images of a fit."""
 _OLDER_IMAGES = "pictures.npz"
 """Name of the same file in version 0.1.0."""
-_PRESENT_NAMES = {**OLDER_NAMES, "error_budget": "error_breakdown"}
-"""Keys that version 0.1.0 wrote, and their present names."""
+_PRESENT_NAMES = {
+    **OLDER_NAMES,
+    "error_budget": "error_breakdown",
+    "visibility_map_size": "map_size",
+}
+"""Names that version 0.1.0 wrote, as keys or in lists, and their present names."""
 _KINDS = {
     "parameters": dict,
     "metrics": dict,
@@ -79,7 +84,12 @@ def _with_present_names(value: Any) -> Any:
     """A JSON value with the keys of version 0.1.0 replaced by their present names, at every depth."""
     if isinstance(value, dict):
         return {_PRESENT_NAMES.get(key, key): _with_present_names(each) for key, each in value.items()}
-    return [_with_present_names(each) for each in value] if isinstance(value, list) else value
+    if isinstance(value, list):
+        return [
+            _PRESENT_NAMES.get(each, each) if isinstance(each, str) else _with_present_names(each)
+            for each in value
+        ]
+    return value
 
 
 def read_json_object(path: Path) -> dict[str, Any]:
@@ -99,7 +109,7 @@ def read_json_object(path: Path) -> dict[str, Any]:
     return document
 
 
-def split_figures(document: dict[str, Any], split: str, variant: str) -> dict[str, Any]:
+def split_figures(document: Mapping[str, Any], split: str, variant: str) -> dict[str, Any]:
     """The figures of a variant over the views of a split, by name; empty if unknown."""
     figures = (document.get("metrics") or {}).get(split)
     figures = figures.get(variant) if isinstance(figures, dict) else None

@@ -1,5 +1,6 @@
 """The page of a library: totals, tuned scenes from worst to best, and other scenes with the reason."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 
@@ -137,7 +138,7 @@ def _cards(batch: BatchFolder, rows: list[TunedRow], untuned: list[UntunedRow]) 
     ]
 
 
-def _median(values: list[float | None]) -> float | None:
+def _median(values: Sequence[float | None]) -> float | None:
     known = [value for value in values if value is not None]
     return float(median(known)) if known else None
 

@@ -53,6 +53,7 @@ def _environment() -> jinja2.Environment:
 
 def _source(name: str) -> str:
     environment = _environment()
+    assert environment.loader is not None
     return environment.loader.get_source(environment, name)[0]
 
 

@@ -21,7 +21,10 @@ def finite(value: Any) -> float | None:
 
 def words(name: str) -> str:
     """The name of a key as words, for example `vpl_count` as "VPL count"."""
-    spoken = {"vpl": "VPL", "vpls": "VPLs", "n": "N", "sha256": "SHA-256", "jax": "JAX", "opengl": "OpenGL"}
+    spoken = {
+        **{"vpl": "VPL", "vpls": "VPLs", "rsm": "RSM", "n": "N"},
+        **{"sha256": "SHA-256", "jax": "JAX", "opengl": "OpenGL"},
+    }
     return " ".join(spoken.get(word, word) for word in name.split("_"))
 
 

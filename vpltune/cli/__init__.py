@@ -1,1 +1,1 @@
-"""The commands of `vpltune`: each parses, calls the library and prints."""
+"""The commands of `vpltune`. Each one parses its arguments, calls the library and returns a report."""

@@ -1,9 +1,9 @@
-"""What holds for every command: `--quiet`, `--verbose`, and one line where an extra is not installed."""
+"""Options and errors of every command: `--quiet`, `--verbose`, and one line if an extra is not installed."""
 
 import functools
 import inspect
 from collections.abc import Callable
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -20,12 +20,10 @@ VerboseOption = Annotated[
 
 
 def any_command(command: Callable[..., Report], name: str) -> Callable[..., Report]:
-    """`command` with `--quiet` and `--verbose`, and its missing extra told in one line.
+    """Decorate a command with `--quiet` and `--verbose`; a missing extra becomes an error of one line.
 
-    typer reads a command's options from its signature: there, the two flags come last.
-
-    Raises:
-        MachineError: the command imports a package of an extra that is not installed.
+    typer reads the options from the signature of the command, so the signature is changed. The decorated
+    command raises MachineError if it imports a package of an extra that is not installed.
     """
 
     @functools.wraps(command)
@@ -34,7 +32,7 @@ def any_command(command: Callable[..., Report], name: str) -> Callable[..., Repo
         try:
             return command(**given)
         except ImportError as error:
-            # Here, because what is wrong is rarely an import.
+            # Imported here, because it is rarely needed.
             from vpltune.tuner.doctor.extras import extra_to_install, how_to_install
 
             extra = extra_to_install(error)
@@ -52,6 +50,8 @@ def any_command(command: Callable[..., Report], name: str) -> Callable[..., Repo
             for flag, annotation in flags.items()
         ),
     ]
-    with_flags.__signature__ = inspect.Signature(parameters, return_annotation=Report)  # type: ignore[attr-defined]
-    with_flags.__annotations__ = {each.name: each.annotation for each in parameters}
-    return with_flags
+    # `Any`: the type of a function has no signature of its own to set.
+    typed: Any = with_flags
+    typed.__signature__ = inspect.Signature(parameters, return_annotation=Report)
+    typed.__annotations__ = {each.name: each.annotation for each in parameters}
+    return typed

@@ -1,4 +1,4 @@
-"""`vpltune batch`: a library of scenes in, a record and a tuned config for each out."""
+"""`vpltune batch`: fits every scene of a library, and writes a record and a tuned config for each."""
 
 import os
 import re
@@ -22,19 +22,20 @@ from vpltune.cli.options import (
     VisibilityOption,
     parse_size,
 )
-from vpltune.cli.report import OK, PARTLY_DONE, Report
+from vpltune.cli.report import OK, PARTLY_DONE, Report, warn
 from vpltune.renderer.errors import InputError
 
 if TYPE_CHECKING:
     from vpltune.tuner.batch.batch import BatchResult, Scheduler
     from vpltune.tuner.batch.supervised_process import Limits
 
-RUN_PANEL = "How it is run"
+RUN_PANEL = "Execution"
 SCENE_MEMORY_BYTES = 2 * 2**30
-"""The memory that each worker should have: twice what a process that fits takes."""
+"""Memory to plan for each worker. A choice: twice what a fitting process takes."""
 SLURM_TASKS = 64
-"""How many tasks a Slurm array has where `--workers` is not given."""
+"""Default number of tasks in a Slurm array. A choice."""
 MEMORY_UNITS = {"M": 2**20, "G": 2**30}
+"""Bytes of a unit of `--memory-limit`."""
 
 
 def batch(
@@ -42,7 +43,7 @@ def batch(
         Path,
         typer.Argument(
             metavar="LIBRARY",
-            help="A folder, with all scenes below it, or a text file that names a scene a line.",
+            help="A folder, searched recursively for scenes, or a text file with one scene per line.",
             show_default=False,
         ),
     ],
@@ -61,7 +62,7 @@ def batch(
         typer.Option(
             min=1,
             max=1024,
-            help="Scenes at a time. [as many as cores and memory allow]",
+            help="Scenes to fit in parallel; by default as many as cores and memory allow.",
             show_default=False,
             rich_help_panel=RUN_PANEL,
         ),
@@ -71,24 +72,20 @@ def batch(
     ] = 1,
     retries: Annotated[
         int,
-        typer.Option(
-            min=0, max=100, help="Further attempts at a scene that failed.", rich_help_panel=RUN_PANEL
-        ),
+        typer.Option(min=0, max=100, help="Further attempts after a scene fails.", rich_help_panel=RUN_PANEL),
     ] = 3,
     retry_failed: Annotated[
-        bool, typer.Option(help="Try scenes again that failed before.", rich_help_panel=RUN_PANEL)
+        bool, typer.Option(help="Retry scenes that failed in an earlier run.", rich_help_panel=RUN_PANEL)
     ] = False,
     time_limit: Annotated[
         float,
-        typer.Option(
-            metavar="SECONDS", help="For each attempt; then it is stopped.", rich_help_panel=RUN_PANEL
-        ),
+        typer.Option(metavar="SECONDS", help="Stop an attempt after this time.", rich_help_panel=RUN_PANEL),
     ] = SCENE_SECONDS,
     memory_limit: Annotated[
         str | None,
         typer.Option(
             metavar="N[M|G]",
-            help="For each scene, in MiB or GiB. [the machine's ÷ workers]",
+            help="Memory limit of a scene, in MiB or GiB; by default the machine's memory ÷ workers.",
             show_default=False,
             rich_help_panel=RUN_PANEL,
         ),
@@ -106,25 +103,28 @@ def batch(
         str | None,
         typer.Option(
             metavar="KEY=VALUE,…",
-            help="Run as an array of Slurm tasks; submitit's parameters, as partition=cpu,timeout_min=240.",
+            help="Run as a Slurm job array with these parameters of submitit: partition=cpu,timeout_min=240.",
             show_default=False,
             rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     tensorboard: Annotated[
-        bool, typer.Option(help="Write loss curves for TensorBoard too.", rich_help_panel=RUN_PANEL)
+        bool, typer.Option(help="Also write loss curves for TensorBoard.", rich_help_panel=RUN_PANEL)
     ] = False,
     json: JsonOption = False,
 ) -> Report:
-    """Tune every scene of a library; run again, it goes on where it was, and does nothing twice."""
+    """Fit every scene of a library. Run it again to resume: finished scenes are not repeated."""
     from vpltune.cli.batch_display import shown_batch
     from vpltune.cli.command_line import command_line
+    from vpltune.cli.quality_flags import with_flags
     from vpltune.renderer.config.tuned_config import config_text, read_config
     from vpltune.tuner.batch.batch import run_batch
     from vpltune.tuner.batch.job import JobOptions
 
+    start, overridden = with_flags(read_config(config), visibility=visibility)
+    warn(overridden)
     options = JobOptions(
-        start=config_text(read_config(config).seen_by(visibility)),
+        start=config_text(start),
         views=views,
         seed=seed,
         bounces=bounces,
@@ -151,7 +151,7 @@ def batch(
 
 
 def _workers_that_fit(threads: int) -> int:
-    """How many scenes at a time this machine has cores and memory for."""
+    """The number of scenes that this machine has cores and memory to fit in parallel."""
     from vpltune.tuner.batch.supervised_process import machine_memory_bytes
 
     cores = len(os.sched_getaffinity(0))
@@ -159,7 +159,7 @@ def _workers_that_fit(threads: int) -> int:
 
 
 def _limits(time_limit: float, memory_limit: str | None, retries: int, sharing: int | None) -> "Limits":
-    """`sharing`: how many scenes share this machine's memory; None where they run elsewhere."""
+    """Limits of an attempt; `sharing` scenes share this machine's memory, None if they run elsewhere."""
     from vpltune.tuner.batch.supervised_process import UNLIMITED_BYTES, Limits, machine_memory_bytes
 
     if not time_limit > 0.0:
@@ -188,7 +188,7 @@ def _scheduler(
 
 
 def parse_slurm(text: str) -> dict[str, str | int]:
-    """Parameters from "partition=cpu,timeout_min=240"; none from "".
+    """Parse parameters such as "partition=cpu,timeout_min=240"; whole numbers become int.
 
     Raises:
         InputError: a part is not KEY=VALUE.
@@ -197,16 +197,16 @@ def parse_slurm(text: str) -> dict[str, str | int]:
     for part in filter(None, text.split(",")):
         key, equals, value = part.partition("=")
         if not (key and equals):
-            raise InputError(f"--slurm: must be KEY=VALUE parted by commas, got {part!r:.60}")
+            raise InputError(f"--slurm: must be KEY=VALUE separated by commas, got {part!r:.60}")
         parameters[key] = int(value) if value.isdecimal() else value
     return parameters
 
 
 def parse_memory(text: str) -> int:
-    """Bytes from "900M" or "4G"; a number alone counts MiB.
+    """Parse a size such as "900M" or "4G" into bytes; a number without a unit counts MiB.
 
     Raises:
-        InputError: the text is of another form, or zero.
+        InputError: the text has another form, or the size is zero.
     """
     match = re.fullmatch(r"([0-9]{1,9})([MG]?)", text.upper())
     size = int(match[1]) * MEMORY_UNITS[match[2] or "M"] if match else 0

@@ -1,4 +1,4 @@
-"""A batch while it runs, on stderr: bars on a terminal, a line for each scene anywhere else."""
+"""Progress of a batch on stderr: bars on a terminal, a line for each scene anywhere else."""
 
 import contextlib
 import sys
@@ -15,11 +15,12 @@ if TYPE_CHECKING:
     from vpltune.tuner.batch.time_to_finish import Forecast
 
 STAGES = ("load", "reference", "capture", "fit", "evaluate")
+"""Stages of a fit that a scene's bar counts."""
 
 
 @contextlib.contextmanager
 def shown_batch(workers: int) -> Iterator["SilentDisplay | LineDisplay | BarDisplay"]:
-    """Whoever watches a batch of so many scenes at a time, until the block ends."""
+    """Display a batch that fits `workers` scenes in parallel, until the block ends."""
     from vpltune.tuner.batch.time_to_finish import Forecast
 
     if is_quiet():
@@ -32,42 +33,42 @@ def shown_batch(workers: int) -> Iterator["SilentDisplay | LineDisplay | BarDisp
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
-    # Texts are names of files: no markup.
+    # The texts are file names, so markup is off.
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         TextColumn("{task.fields[note]}", markup=False),
     )
     console = Console(stderr=True)
-    # Nothing else is redirected: with --json, stdout is not ours to draw on.
+    # stdout is not redirected, because --json writes to it.
     with Progress(*columns, console=console, redirect_stdout=False, redirect_stderr=False) as bars:
         yield BarDisplay(forecast, bars)
 
 
 class SilentDisplay:
-    """Nothing, with `--quiet`."""
+    """Prints nothing, for `--quiet`."""
 
     def found(self, jobs: "Sequence[Job]", already_done: int) -> None:
-        """Told once, before anything starts: the scenes to tune, and how many have a record."""
+        """Ignore the scenes to fit."""
 
     def happened(self, event: dict[str, Any]) -> None:
-        """Told of each event of the batch's log."""
+        """Ignore a scheduler's event."""
 
 
 class LineDisplay:
-    """Plain lines: what is there to do, and each scene as it ends."""
+    """Plain lines: the number of scenes, and each scene when it ends."""
 
     def __init__(self, forecast: "Forecast") -> None:
         self._forecast = forecast
 
     def found(self, jobs: "Sequence[Job]", already_done: int) -> None:
-        """Told once, before anything starts: the scenes to tune, and how many have a record."""
+        """Print the number of scenes to fit, and of those that have a record from an earlier run."""
         self._forecast.found(jobs)
         known = f", {already_done} have a record" if already_done else ""
         say(f"{len(jobs)} scene{'s' * (len(jobs) != 1)} to tune{known}")
 
     def happened(self, event: dict[str, Any]) -> None:
-        """Told of each event of the batch's log."""
+        """Print a line if the scheduler's event ends an attempt or a scene."""
         self._forecast.happened(event, time.monotonic())
         line = ending(event)
         if line and event["event"] == "record":
@@ -78,7 +79,7 @@ class LineDisplay:
 
 
 class BarDisplay:
-    """A bar for the whole batch and one for each scene at work; scenes that ended scroll away above."""
+    """A bar for the batch and one for each running scene; finished scenes scroll away above."""
 
     def __init__(self, forecast: "Forecast", bars: "Bars") -> None:
         self._forecast = forecast
@@ -86,14 +87,14 @@ class BarDisplay:
         self._scenes: dict[str, Any] = {}
 
     def found(self, jobs: "Sequence[Job]", already_done: int) -> None:
-        """Told once, before anything starts: the scenes to tune, and how many have a record."""
+        """Add the bar of the batch, with the scenes that have a record from an earlier run."""
         self._forecast.found(jobs)
         self._already_done = already_done
         self._whole = self._bars.add_task("scenes", total=len(jobs) + already_done, note="")
         self._bars.update(self._whole, completed=already_done)
 
     def happened(self, event: dict[str, Any]) -> None:
-        """Told of each event of the batch's log."""
+        """Update the bars by a scheduler's event, and print a line if it ends an attempt or a scene."""
         self._forecast.happened(event, time.monotonic())
         key = event.get("key", "")
         if event["event"] == "scene_started":
@@ -113,7 +114,7 @@ class BarDisplay:
 
 
 def ending(event: dict[str, Any]) -> str:
-    """A line for an event that ends something; empty for any other."""
+    """The line for a failed attempt or a finished scene; empty for other events."""
     if event["event"] == "attempt_failed":
         return one_line(f"{event['name']}: attempt {event['attempt']} failed: {event['reason']}")
     if event["event"] == "record":
@@ -124,7 +125,7 @@ def ending(event: dict[str, Any]) -> str:
 
 
 def time_left(forecast: "Forecast") -> str:
-    """The forecast in words, "; 3 to 5 min left"; empty while there is nothing to go by, and at the end."""
+    """The forecast in words, such as "; 3 to 5 min left"; empty if there is none yet, and at the end."""
     span = forecast.seconds_left(time.monotonic())
     if span is None or span[1] <= 0.0:
         return ""

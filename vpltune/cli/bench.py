@@ -1,6 +1,6 @@
-"""`vpltune bench`: the benchmarks of a checkout, each figure beside what it is measured against."""
+"""`vpltune bench`: runs the benchmarks of a checkout."""
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -8,12 +8,15 @@ from vpltune.cli.options import JsonOption
 from vpltune.cli.report import Report
 from vpltune.renderer.errors import InputError
 
+if TYPE_CHECKING:
+    from rich.console import JustifyMethod
+
 
 def bench(
     name: Annotated[str, typer.Argument(metavar="NAME", help="A benchmark, or `all`.")] = "all",
     json: JsonOption = False,
 ) -> Report:
-    """Run a benchmark: each row is a figure, what it is measured against, and their ratio."""
+    """Run a benchmark: each row has a figure, its baseline and their ratio."""
     try:
         from benchmarks import benchmark_names, run_benchmark
         from benchmarks.harness.machine import machine_description
@@ -40,15 +43,16 @@ def _table(rows: list[dict]) -> object:
     from rich.table import Table
 
     table = Table()
-    for heading, justify in (
+    columns: tuple[tuple[str, JustifyMethod], ...] = (
         ("", "left"),
         ("value", "right"),
         ("unit", "left"),
         ("against", "left"),
         ("its value", "right"),
         ("ratio", "right"),
-    ):
-        # Names are to be found again, and must not be cut.
+    )
+    for heading, justify in columns:
+        # Fold names instead of cutting them: they are search terms.
         table.add_column(heading, justify=justify, overflow="fold")
     for row in rows:
         table.add_row(

@@ -1,4 +1,4 @@
-"""`--vpl-count`, `--budget-ms`, `--pareto` and `--frame-size` of `vpltune fit`, and what they end with."""
+"""Flags `--vpl-count`, `--budget-ms`, `--pareto` and `--frame-size` of `vpltune fit`, and their output."""
 
 import math
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from vpltune.tuner.frame_time.fit_budget import BudgetOptions
 
 
 def with_vpl_count(config: TunedConfig, vpl_count: int | None) -> TunedConfig:
-    """`config` with that many VPLs; None keeps its own."""
+    """`config` with this VPL count; None keeps the config's own."""
     if vpl_count is None:
         return config
     return replace(config, parameters=replace(config.parameters, vpl_count=vpl_count))
@@ -21,29 +21,31 @@ def with_vpl_count(config: TunedConfig, vpl_count: int | None) -> TunedConfig:
 def budget_from_flags(
     vpl_count: int | None, budget_ms: float | None, pareto: bool, frame_size: str | None
 ) -> BudgetOptions | None:
-    """What the flags ask for; None where there is no budget.
+    """The budget that the flags ask for; None if they ask for none.
 
     Raises:
-        InputError: a flag without the one that it belongs to, two that exclude each other, or no such value.
+        InputError: a flag lacks the one that it needs, two exclude each other, or a value is out of range.
     """
     if budget_ms is None and not pareto:
         if frame_size is not None:
             raise InputError("--frame-size: needs --budget-ms or --pareto")
         return None
     if vpl_count is not None:
-        raise InputError(f"--vpl-count: a budget chooses the count itself, got {vpl_count}")
+        raise InputError(
+            f"--vpl-count: a budget picks the count, so it cannot be given with one; got {vpl_count}"
+        )
     if budget_ms is not None and not 0.0 < budget_ms < math.inf:
         raise InputError(f"--budget-ms: must be a positive number of milliseconds, got {budget_ms}")
     return BudgetOptions(budget_ms, pareto, None if frame_size is None else parse_size(frame_size))
 
 
 def budget_lines(document: Mapping[str, Any]) -> tuple[Any, ...]:
-    """What `vpltune fit` shows of density, budget and front."""
+    """The lines and the table that `vpltune fit` prints for density, budget and front."""
     lines: list[Any] = []
     if "density" in document:
         errors = document["density"]["held_out_relmse"]
         lines.append(
-            f"{document['density']['vpl_count']} VPLs, rotations not fitted to: relMSE "
+            f"{document['density']['vpl_count']} VPLs, on held-out rotations: relMSE "
             f"{errors['tuned']:.3g}, default {errors['default']:.3g}"
         )
     if "budget" in document:

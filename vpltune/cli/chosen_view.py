@@ -1,4 +1,4 @@
-"""Which view a command draws: one of a views.json, or one placed from flags, the scene or by choice."""
+"""The view that a command draws: one of a views.json, or one from flags, from the scene, or placed for it."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,20 +17,31 @@ if TYPE_CHECKING:
     from vpltune.renderer.scene.scene import Scene
 
 DEFAULT_SIZE = (960, 540)
-"""Width and height in pixels, where neither a flag nor a views.json gives them."""
+"""Width and height of an image, in pixels. A choice."""
 
 
 @dataclass(frozen=True)
 class ChosenView:
-    """What the command line says of a view, before the scene is read; None where it does not."""
+    """What the command line says about the view, before the scene is read."""
 
     from_file: View | None
+    """A view of `--views`; None without that flag."""
     camera: Camera | None
+    """None if no camera was given."""
     light: Light | None
+    """None if no light was given."""
     size: tuple[int, int]
+    """Width and height of the image, in pixels."""
 
     def placed(self, scene: "Scene", scene_path: Path) -> View:
-        """The view; what is not said comes from a file beside the scene or the scene, or is chosen, aloud."""
+        """The view of a scene, with warnings about what was chosen.
+
+        A camera or light that was not given comes from the scene's sidecar or from the scene, or is placed
+        automatically.
+
+        Raises:
+            InputError: the sidecar cannot be used.
+        """
         if self.from_file is not None:
             return replace(self.from_file, size=self.size)
         given = None if self.light is None else (self.light,)
@@ -40,10 +51,10 @@ class ChosenView:
 
 
 def chosen_view(views: Path | None, name: str | None, size: str | None, flags: ViewFlags) -> ChosenView:
-    """`--views`, `--view`, `--size` and the flags of camera and light.
+    """Check `--views`, `--view`, `--size` and the flags of camera and light.
 
     Raises:
-        InputError: they do not go together, or there is no such view, or a value is out of range.
+        InputError: flags exclude each other, the views file has no such view, or a value is out of range.
     """
     from_file = _view_from_file(views, name, flags)
     unasked = DEFAULT_SIZE if from_file is None else from_file.size
@@ -61,7 +72,7 @@ def _view_from_file(path: Path | None, name: str | None, flags: ViewFlags) -> Vi
     found = read_views(path)
     names = [view.name for view in found]
     if name is None and len(found) > 1:
-        raise InputError(f"--view: must be given, {path} has {', '.join(names)}")
+        raise InputError(f"--view: must be given: {path} has {', '.join(names)}")
     if name is not None and name not in names:
         raise InputError(f"--view: {path} has {', '.join(names)}, got {name!r:.60}")
-    return found[0] if name is None else found[names.index(name)]
+    return next(view for view in found if name in (None, view.name))

@@ -1,4 +1,4 @@
-"""What was typed, for the record that a command leaves of itself."""
+"""The command line that was typed, for the provenance of files."""
 
 import shlex
 from contextvars import ContextVar
@@ -8,5 +8,5 @@ command_arguments: ContextVar[tuple[str, ...]] = ContextVar("command_arguments",
 
 
 def command_line() -> str:
-    """The running command as a shell takes it."""
+    """The running command, quoted for a shell."""
     return shlex.join(("vpltune", *command_arguments.get()))

@@ -1,4 +1,4 @@
-"""`vpltune evaluate`: how close a config comes to the path tracer."""
+"""`vpltune evaluate`: measures a config against the path tracer."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,10 +24,10 @@ from vpltune.renderer.errors import InputError
 def evaluate(
     scene: SceneArgument,
     config: Annotated[
-        str, typer.Option(metavar="FILE", help="The tuned config: a file, `default` or `auto`.")
+        str, typer.Option(metavar="FILE", help="Config to measure: a file, `default` or `auto`.")
     ],
     views: Annotated[
-        str, typer.Option(metavar="N|FILE", help="How many views are fitted, or the views.json of a fit.")
+        str, typer.Option(metavar="N|FILE", help="Number of fitted views, or the views.json of a fit.")
     ] = str(VIEW_COUNT),
     seed: SeedOption = 0,
     visibility: VisibilityOption = None,
@@ -42,12 +42,15 @@ def evaluate(
 
     from vpltune.cli.metrics_table import error_breakdown_table, metrics_table
     from vpltune.cli.progress_display import shown_progress
+    from vpltune.cli.quality_flags import with_flags
     from vpltune.cli.view_flags import camera_from_flags, light_from_flags
     from vpltune.renderer.config.tuned_config import read_config
     from vpltune.tuner.scene_fit.evaluate_scene import EvaluateOptions, evaluate_scene
 
+    tuned, overridden = with_flags(read_config(config), visibility=visibility)
+    warn(overridden)
     options = EvaluateOptions(
-        tuned=read_config(config).seen_by(visibility),
+        tuned=tuned,
         seed=seed,
         bounces=bounces,
         split_error=split_error,
@@ -67,7 +70,7 @@ def evaluate(
 
 
 def _views(text: str, placed: bool) -> dict[str, Any]:
-    """The options that say which views: how many, or exactly those of a file."""
+    """The options for the views: a number of views, or those of a file."""
     from vpltune.renderer.scene.views import read_views
 
     if text.isdecimal():
@@ -75,5 +78,5 @@ def _views(text: str, placed: bool) -> dict[str, Any]:
             raise InputError(f"--views: must be from 1 to {LARGEST_VIEW_COUNT}, or a file, got {text:.60}")
         return {"views": int(text)}
     if placed:
-        raise InputError("--views: a file has its own cameras and lights; leave out the flags for them")
+        raise InputError("--views: a file has its own cameras and lights; leave out the flags for these")
     return {"views_path": Path(text), "fixed_views": read_views(Path(text))}

@@ -1,7 +1,7 @@
-"""`vpltune export`: a config in the form another program takes, alone or with a scene to draw."""
+"""`vpltune export`: writes a config for another program, alone or with a scene to draw."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
@@ -19,11 +19,13 @@ from vpltune.renderer.errors import InputError
 if TYPE_CHECKING:
     from vpltune.cli.chosen_view import ChosenView
     from vpltune.renderer.config.tuned_config import TunedConfig
+    from vpltune.renderer.export.config_export import ExportFormat
     from vpltune.renderer.export.scene_bundle import SceneBundle
 
 Form = Literal["json", "glsl", "c", "std140", "gltf", "bundle", "web"]
 WITH_SCENE = ("gltf", "bundle", "web")
-WITH_VIEW = ("bundle", "web")
+WITH_VIEW: Final = ("bundle", "web")
+WITH_CHECKSUM: Final = ("json", "gltf")
 
 
 @takes_view_flags
@@ -39,30 +41,32 @@ def export(
     to: Annotated[
         Form,
         typer.Option(
-            help="Normalised JSON; GLSL constants or uniform block; a C header; the bytes of that block; the "
-            "extras of a copy of --scene; what it takes to draw --scene, as JSON and .bin; a web page of it."
+            help="json: the config; glsl: constants or a uniform block; c: a header; std140: the bytes of "
+            "the block; gltf: a copy of --scene with the config in its extras; bundle: all that draws "
+            "--scene, as JSON and .bin; web: a page that draws --scene."
         ),
     ],
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", metavar="OUT", help="The file to write; for a bundle, the folder."),
+        typer.Option("-o", "--output", metavar="OUT", help="File to write; for a bundle, a folder."),
     ],
     scene: Annotated[
         Path | None,
-        typer.Option(metavar="SCENE", help="gltf, bundle, web: the scene.", show_default=False),
+        typer.Option(metavar="SCENE", help="Scene for gltf, bundle and web.", show_default=False),
     ] = None,
     size: ImageSizeOption = None,
     visibility: VisibilityOption = None,
     views: ViewsFileOption = None,
     view: ViewNameOption = None,
     renew_checksum: Annotated[
-        bool, typer.Option("--renew-checksum", help="json: accept a file that was edited by hand.")
+        bool,
+        typer.Option("--renew-checksum", help="For json and gltf: accept a config that was edited by hand."),
     ] = False,
     *,
     flags: ViewFlags,
     json: JsonOption = False,
 ) -> Report:
-    """Write a config for another program: as text, as bytes, into a glTF scene, or with a scene to draw."""
+    """Write a config for another program: as text, as bytes, in a glTF scene, or with a scene to draw."""
     from rich.markup import escape
 
     from vpltune.cli.quality_flags import with_flags
@@ -71,15 +75,15 @@ def export(
     if to in WITH_SCENE and scene is None:
         raise InputError(f"--scene: must be given with --to {to}")
     if to not in WITH_SCENE and scene is not None:
-        raise InputError(f"--scene: --to {to} takes none")
+        raise InputError(f"--scene: cannot be given with --to {to}")
     if to not in WITH_VIEW and (flags != ViewFlags() or views or view or size):
         raise InputError(
             f"--to {to}: takes no camera, light, view or size; --to {' and '.join(WITH_VIEW)} do"
         )
     if to == "web" and output.suffix.lower() != ".html":
         raise InputError(f"{output}: the file name must end in .html, got {output.suffix or 'no suffix'!r}")
-    if renew_checksum and to != "json":
-        raise InputError(f"--renew-checksum: goes with --to json, got --to {to}")
+    if renew_checksum and to not in WITH_CHECKSUM:
+        raise InputError(f"--renew-checksum: needs --to {' or '.join(WITH_CHECKSUM)}, got --to {to}")
     config, overridden = with_flags(read_config(file, check=not renew_checksum), visibility=visibility)
     warn(overridden)
     fit = fit_outcome(config)
@@ -105,19 +109,21 @@ def export(
 
 
 def fit_outcome(config: "TunedConfig") -> str | None:
-    """How the fit that wrote the config ended; None where no fit did, or does not say."""
+    """How the fit that wrote the config ended; None if no fit wrote it or its outcome is unknown."""
     return None if config.fit is None else config.fit.status
 
 
 def fit_warnings(config: "TunedConfig") -> tuple[str, ...]:
-    """A sentence where what is exported is not better than the start of its fit."""
+    """A warning if the config is not better than the start of its fit; else empty."""
     fit = config.fit
     if fit is None or fit.status == "improved":
         return ()
     return (f"this config is from a fit that ended {fit.status}: {fit.sentence or 'no reason given'}",)
 
 
-def _write(config: "TunedConfig", to: Form, output: Path, scene: Path | None) -> None:
+def _write(
+    config: "TunedConfig", to: "ExportFormat | Literal['gltf']", output: Path, scene: Path | None
+) -> None:
     import json
 
     from vpltune.renderer.config.gltf_extras import write_gltf_extras
@@ -142,7 +148,7 @@ def _bundle(config: "TunedConfig", scene: Path, chosen: "ChosenView") -> "SceneB
     warn(loaded.warnings)
     drawn = chosen.placed(loaded, scene)
     if loaded.animation is not None:
-        warn(("the scene's animation is left out: it stands as it does at rest",))
+        warn(("the scene's animation is left out: the scene is exported at rest",))
     return scene_bundle(loaded, drawn, config)
 
 

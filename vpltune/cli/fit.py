@@ -1,6 +1,7 @@
-"""`vpltune fit`: a scene in, a tuned config out."""
+"""`vpltune fit`: fits a config to a scene."""
 
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -41,7 +42,7 @@ def fit(
         typer.Option(
             min=1,
             max=65536,
-            help="How many VPLs to fit for; up to 256, their density is fitted too, over several rotations.",
+            help="VPL count to fit for; up to 256, their placement density is fitted too.",
             show_default=False,
         ),
     ] = None,
@@ -49,20 +50,20 @@ def fit(
         float | None,
         typer.Option(
             metavar="MS",
-            help="Choose VPL count and density for frames of this time on this machine.",
+            help="Pick the VPL count and quality settings that meet this frame time on this machine.",
             show_default=False,
         ),
     ] = None,
     pareto: Annotated[
-        bool, typer.Option("--pareto", help="Write the whole front of error against frame time.")
+        bool, typer.Option("--pareto", help="Write the Pareto front of error against frame time.")
     ] = False,
     frame_size: Annotated[
         str | None,
-        typer.Option(metavar="WxH", help="Size of the frames that are timed. [--size]", show_default=False),
+        typer.Option(metavar="WxH", help="Size of the timed frames, in pixels. [--size]", show_default=False),
     ] = None,
     motion: Annotated[
         bool,
-        typer.Option("--motion", help="Accept only what flickers no more than the start as lights move."),
+        typer.Option("--motion", help="Accept a fit only if it flickers no more than the start."),
     ] = False,
     bounces: BouncesOption = "1",
     split_error: SplitErrorOption = False,
@@ -70,17 +71,19 @@ def fit(
     flags: ViewFlags,
     json: JsonOption = False,
 ) -> Report:
-    """Fit a scene: write DIR/tuned.json, views.json, metrics.json, and images before and after."""
+    """Fit a scene; write DIR/tuned.json, views.json, metrics.json, and images before and after."""
     from vpltune.cli.budget_flags import budget_from_flags, with_vpl_count
     from vpltune.cli.progress_display import shown_progress
+    from vpltune.cli.quality_flags import with_flags
     from vpltune.cli.view_flags import camera_from_flags, light_from_flags
     from vpltune.renderer.config.tuned_config import read_config
     from vpltune.tuner.fitting.fit_density import FEW_VPLS
     from vpltune.tuner.scene_fit.fit_scene import FitOptions, fit_scene
 
-    start = with_vpl_count(read_config(config).seen_by(visibility), vpl_count)
+    start, overridden = with_flags(read_config(config), visibility=visibility)
+    warn(overridden)
     options = FitOptions(
-        start=start,
+        start=with_vpl_count(start, vpl_count),
         density=vpl_count is not None and vpl_count <= FEW_VPLS,
         budget=budget_from_flags(vpl_count, budget_ms, pareto, frame_size),
         motion=motion,
@@ -91,8 +94,9 @@ def fit(
         camera=camera_from_flags(flags),
         light=light_from_flags(flags),
         command=command_line(),
-        **({} if size is None else {"size": parse_size(size)}),
     )
+    if size is not None:
+        options = replace(options, size=parse_size(size))
     with shown_progress() as progress:
         result = fit_scene(scene, output, options, progress)
     warn(result.notes)

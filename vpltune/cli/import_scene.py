@@ -1,4 +1,4 @@
-"""`vpltune import`: a scene in another renderer's format as a self-contained .glb."""
+"""`vpltune import`: converts a scene of another renderer to a self-contained .glb."""
 
 from pathlib import Path
 from typing import Annotated
@@ -17,7 +17,7 @@ def import_scene(
     output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="The .glb to write.")],
     json: JsonOption = False,
 ) -> Report:
-    """Turn a Mitsuba scene into a .glb: camera, lights, diffuse materials, triangles, textures."""
+    """Convert a Mitsuba scene to a .glb: camera, lights, diffuse materials, triangles, textures."""
     from rich.markup import escape
 
     if scene.suffix.lower() != ".xml":

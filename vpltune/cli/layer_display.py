@@ -1,4 +1,4 @@
-"""Layers of an image as a screen shows them."""
+"""Converts the layers of an image to display colours."""
 
 import numpy as np
 
@@ -10,9 +10,19 @@ from vpltune.renderer.frame.runtime import Runtime
 def for_display(
     runtime: Runtime, layer: Layer, pixels: np.ndarray, exposure: float | None = None
 ) -> np.ndarray:
-    """A layer as display-referred colours, uint8 or floats in [0, 1], in the way it is usually looked at.
+    """Convert a layer to display colours.
 
-    `exposure` None measures it from the image.
+    Radiance and irradiance are exposed and tone-mapped, albedo is encoded as sRGB, normals are mapped to
+    [0, 1], and depth becomes the nearest depth over the depth.
+
+    Args:
+        runtime: exposes and tone-maps.
+        layer: the layer that `pixels` are.
+        pixels: [height, width, 3], or [height, width] for depth, as `Runtime.render` returns them.
+        exposure: factor of radiance and irradiance; None measures it from the image.
+
+    Returns:
+        [height, width, 3], uint8 or float in [0, 1].
     """
     if layer in ("direct", "indirect", "irradiance"):
         return runtime.display(pixels, exposure)
@@ -21,7 +31,7 @@ def for_display(
     if layer == "normal":
         return 0.5 + 0.5 * pixels
     if layer == "depth":
-        # Nearest over depth: white is nearest, black is nothing, and no unit is involved.
+        # Without unit: white is the nearest surface, black is no surface.
         seen = pixels > 0.0
         nearest = pixels[seen].min() if seen.any() else 1.0
         shown = np.divide(nearest, pixels, out=np.zeros_like(pixels), where=seen)

@@ -1,10 +1,13 @@
-"""The table that `fit` and `evaluate` end with."""
+"""The tables that `fit` and `evaluate` print."""
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS
+
+if TYPE_CHECKING:
+    from rich.console import JustifyMethod
 
 ROWS = ("default", "tuned", "ceiling")
 SPLITS = {"fitted": "fitted views", "held_out": "held-out views"}
@@ -16,13 +19,15 @@ FIGURES = {
     "energy_ratio": "energy",
     "flip": "FLIP",
 }
-"""Figures by heading; `tuner.metrics.view_metrics.ViewMetrics` says what they are. The table fits into 80
-columns."""
+"""Heading of each metric (`tuner.metrics.view_metrics.ViewMetrics`). The table fits into 80 columns."""
 _SHARES = ("worst_share", "median_error")
 
 
 def metrics_table(metrics: Mapping[str, Any]) -> Any:
-    """A rich table of all figures: default, tuned and ceiling, and the noise floor, by split."""
+    """A rich table of the metrics of default, tuned and ceiling, and of the noise floor, by split.
+
+    `metrics` is the key `metrics` of metrics.json.
+    """
     from rich.table import Table
 
     table = Table(title="Against the path tracer (worst: 0.1 % of the pixels)", title_justify="left")
@@ -43,18 +48,22 @@ def metrics_table(metrics: Mapping[str, Any]) -> Any:
 def parameters_table(
     parameters: Mapping[str, float | int], uncertainty: Mapping[str, Mapping[str, Any]]
 ) -> Any:
-    """A rich table of the parameters, how sure they are, their defaults and units."""
+    """A rich table of the parameters with intervals, defaults and units.
+
+    The arguments are the keys `parameters` and `uncertainty` of metrics.json.
+    """
     from rich.table import Table
 
     table = Table(title="Parameters", title_justify="left")
     table.add_column("", no_wrap=True)
-    for heading, justify, no_wrap in (
+    columns: tuple[tuple[str, JustifyMethod, bool], ...] = (
         ("value", "right", True),
         ("90 % interval", "right", True),
         ("trades\nwith", "left", False),
         ("default", "right", True),
         ("unit", "left", False),
-    ):
+    )
+    for heading, justify, no_wrap in columns:
         table.add_column(heading, justify=justify, no_wrap=no_wrap)
     for spec in ARTIST_PARAMETERS:
         table.add_row(
@@ -79,7 +88,10 @@ def _sureness(interval: Mapping[str, Any] | None) -> tuple[str, str]:
 
 
 def error_breakdown_table(document: Mapping[str, Any]) -> tuple[Any, ...]:
-    """A rich table of the tuned error by cause, largest first; nothing where it was not split."""
+    """A rich table of the tuned error by cause, largest first; empty if the error was not split.
+
+    `document` is the content of metrics.json.
+    """
     from rich.table import Table
 
     if "error_breakdown" not in document:

@@ -1,6 +1,6 @@
-"""Arguments and options that several commands share, and how their text is read.
+"""Arguments and options that several commands share, and the parsers of their values.
 
-Nothing here imports more than typer, so that `vpltune --help` comes up at once.
+This module imports nothing heavier than typer, so that `vpltune --help` answers at once.
 """
 
 import math
@@ -13,16 +13,15 @@ import typer
 from vpltune.renderer.errors import InputError
 
 LARGEST_SIDE = 16384
-"""Pixels; also the rule of `views.json`."""
+"""Largest side of an image, in pixels; views.json has the same limit."""
 
 LARGEST_VIEW_COUNT = 64
-"""The largest number of views that `--views` takes."""
+"""Most fitted views. A choice."""
 VIEW_COUNT = 4
-"""How many views a scene is fitted to by default. With validation and held-out views, that makes ten light
-positions."""
+"""Default number of fitted views. A choice: with validation and held-out views, ten light positions."""
 
 SCENE_SECONDS = 900.0
-"""The time limit of a batch for one attempt at a scene: many times what the slowest known scene takes."""
+"""Default time limit of an attempt in a batch. A choice: many times what the slowest known scene takes."""
 
 Layer = Literal["final", "direct", "indirect", "irradiance", "albedo", "normal", "depth"]
 Motion = Literal["auto", "none", "light", "camera", "both"]
@@ -42,7 +41,7 @@ InterleaveOption = Annotated[
     int | None,
     typer.Option(
         metavar="1|2|4|8",
-        help="Blocks of NxN pixels share the VPLs out: faster above 1; overrides the config.",
+        help="Divide the VPLs among the pixels of NxN blocks, which is faster; overrides the config.",
         show_default=False,
     ),
 ]
@@ -50,7 +49,7 @@ MapSizeOption = Annotated[
     int | None,
     typer.Option(
         metavar="TEXELS",
-        help="Side of a VPL's visibility map, from 4 to 64; overrides the config.",
+        help="Resolution of a VPL's visibility map, from 4 to 64; overrides the config.",
         show_default=False,
     ),
 ]
@@ -58,7 +57,7 @@ MapRefinementOption = Annotated[
     int | None,
     typer.Option(
         metavar="1|2|4|8",
-        help="How many times finer maps are at silhouettes; overrides the config.",
+        help="Factor by which visibility maps are finer at silhouettes; overrides the config.",
         show_default=False,
     ),
 ]
@@ -66,8 +65,7 @@ RsmResolutionOption = Annotated[
     int | None,
     typer.Option(
         metavar="TEXELS",
-        help="Side of a face of a light's map, which VPLs and shadows come from, from 64 to 8192; overrides "
-        "the config.",
+        help="Resolution of a light's reflective shadow map, from 64 to 8192; overrides the config.",
         show_default=False,
     ),
 ]
@@ -83,44 +81,49 @@ ViewCountOption = Annotated[
         "--views",
         min=1,
         max=LARGEST_VIEW_COUNT,
-        help="How many views of a scene to fit; as many validate the fit, half as many are held out.",
+        help="Number of fitted views; as many validate the fit, and half as many are held out.",
     ),
 ]
 BouncesOption = Annotated[
-    Bounces, typer.Option(help="What the reference is: one bounce, or full global illumination.")
+    Bounces, typer.Option(help="Indirect light of the reference: one bounce, or all of them.")
 ]
 ViewSizeOption = Annotated[
     str | None,
     typer.Option("--size", metavar="WxH", help="Size of the views, in pixels. [64x48]", show_default=False),
 ]
 SplitErrorOption = Annotated[
-    bool, typer.Option("--split-error", help="Split the error that is left by cause; draws some more frames.")
+    bool, typer.Option("--split-error", help="Split the remaining error by cause; draws a few more frames.")
 ]
-SeedOption = Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of everything random.")]
+SeedOption = Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Random seed.")]
 
 
 def parse_numbers(text: str, flag: str, counts: tuple[int, ...]) -> list[float]:
-    """Finite numbers parted by commas.
+    """Parse finite numbers separated by commas.
+
+    Args:
+        text: the value of the flag.
+        flag: named in errors.
+        counts: how many numbers are allowed.
 
     Raises:
-        InputError: another count of them than `counts` allows, or one is not a finite number.
+        InputError: there are more or fewer numbers, or one is not finite or beyond ±1e30.
     """
     need = " or ".join(str(count) for count in counts)
     try:
         numbers = [float(item) for item in text.split(",")]
     except ValueError:
         numbers = []
-    # 1e30: squares of it still fit double precision, and views.json has the same bound.
+    # 1e30: its square still fits double precision, and views.json has the same limit.
     if len(numbers) not in counts or not all(abs(number) <= 1e30 for number in numbers):
-        raise InputError(f"{flag}: must be {need} finite numbers parted by commas, got {text!r:.60}")
+        raise InputError(f"{flag}: must be {need} finite numbers separated by commas, got {text!r:.60}")
     return numbers
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """Width and height in pixels from "640x480".
+    """Parse width and height in pixels, such as "640x480".
 
     Raises:
-        InputError: the text is of another form, or a side is not in [1, LARGEST_SIDE].
+        InputError: the text has another form, or a side is not in [1, `LARGEST_SIDE`].
     """
     match = re.fullmatch(r"([0-9]{1,6})[xX×]([0-9]{1,6})", text)
     size = (int(match[1]), int(match[2])) if match else (0, 0)
@@ -130,10 +133,10 @@ def parse_size(text: str) -> tuple[int, int]:
 
 
 def checked_scale(scale: float) -> float:
-    """`scale`, if it is a factor that single precision survives.
+    """Return `scale` if single precision can represent scenes scaled by it.
 
     Raises:
-        InputError: not a finite number in [1e-6, 1e6].
+        InputError: it is not a finite number in [1e-6, 1e6].
     """
     if not (math.isfinite(scale) and 1e-6 <= scale <= 1e6):
         raise InputError(f"--scale: must be a number from 1e-6 to 1e6, got {scale}")

@@ -1,15 +1,19 @@
-"""Progress of long work, on stderr: a bar on a terminal, lines with percent and time left anywhere else."""
+"""Progress of long work on stderr: a bar on a terminal, lines with percent and time left anywhere else."""
 
 import contextlib
 import sys
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING
 
 from vpltune.cli.verbosity import detail, is_quiet, is_verbose, say
 
+if TYPE_CHECKING:
+    from rich.progress import Progress as Bars
+    from rich.progress import TaskID
+
 Progress = Callable[[str, float], None]
-"""Called with the stage ("reference", "fit", …) and the share of it that is done, in [0, 1]."""
+"""Called with the name of a stage ("reference", "fit", …) and the share of it that is done, in [0, 1]."""
 
 
 @contextlib.contextmanager
@@ -31,6 +35,7 @@ def _bars() -> Iterator[Progress]:
     from rich.console import Console
     from rich.progress import (
         BarColumn,
+        TaskID,
         TaskProgressColumn,
         TextColumn,
         TimeElapsedColumn,
@@ -38,7 +43,7 @@ def _bars() -> Iterator[Progress]:
     )
     from rich.progress import Progress as Bars
 
-    tasks: dict[str, int] = {}
+    tasks: dict[str, TaskID] = {}
     columns = (
         TextColumn("{task.description:<12}"),
         BarColumn(),
@@ -47,7 +52,7 @@ def _bars() -> Iterator[Progress]:
         TextColumn("left"),
         TimeRemainingColumn(),
     )
-    # Nothing else is redirected: with --json, stdout is not ours to draw on.
+    # stdout is not redirected, because --json writes to it.
     with Bars(*columns, console=Console(stderr=True), redirect_stdout=False, redirect_stderr=False) as bars:
 
         def show(stage: str, fraction: float) -> None:
@@ -64,19 +69,21 @@ def _bars() -> Iterator[Progress]:
             _finish(bars, done)
 
 
-def _finish(bars: Any, task: int) -> None:
-    """The stage is over: its bar is full, and its clock stands."""
+def _finish(bars: "Bars", task: "TaskID") -> None:
+    """End a stage: fill its bar and stop its clock."""
     bars.update(task, completed=1.0)
     bars.stop_task(task)
 
 
 LINE_SECONDS = 10.0
-"""Between two lines of one stage, where there is no terminal."""
+"""Least time between two lines of a stage without a terminal. A choice."""
 
 
 def _line_per_stage(begun: dict[str, float]) -> Progress:
-    """A line when a stage begins, and while it goes on one every `LINE_SECONDS` with what is done and
-    left. `begun` gets the time at which each stage began."""
+    """Print a line when a stage begins, then one every `LINE_SECONDS` with percent and time left.
+
+    The time at which each stage began is put into `begun`.
+    """
     last_line = 0.0
 
     def show(stage: str, fraction: float) -> None:
@@ -94,7 +101,7 @@ def _line_per_stage(begun: dict[str, float]) -> Progress:
 
 
 def _tell_seconds(begun: dict[str, float]) -> None:
-    """With `--verbose`: how long each stage took, where one begins as the last ends."""
+    """Print how long each stage took, with `--verbose`; a stage ends when the next one begins."""
     if begun and is_verbose():
         ends = [*list(begun.values())[1:], time.monotonic()]
         for (stage, start), end in zip(begun.items(), ends, strict=True):

@@ -1,6 +1,7 @@
-"""Flags that override a config: `--visibility` and those of its quality part."""
+"""Flags that override a config: `--visibility` and the quality settings."""
 
 from dataclasses import replace
+from typing import Any
 
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, Visibility
@@ -10,17 +11,21 @@ from vpltune.renderer.errors import InputError
 def with_flags(
     config: TunedConfig, *, visibility: Visibility | None = None, **quality: int | None
 ) -> tuple[TunedConfig, tuple[str, ...]]:
-    """`config` with what the flags say, and a sentence for each value of its own that one overrides.
+    """Override values of a config by flags.
 
     Args:
-        config: what was read.
+        config: the config that was read.
         visibility: None keeps the config's own.
         quality: fields of `Quality`; None keeps the config's own.
 
+    Returns:
+        The config, and a sentence for each value other than the default that a flag overrides.
+
     Raises:
-        InputError: a value is out of range, or the visibility does not go with the config's prior.
+        InputError: a value is out of range, or the config has a prior that was trained with another
+            visibility.
     """
-    given = {name: value for name, value in quality.items() if value is not None}
+    given: dict[str, Any] = {name: value for name, value in quality.items() if value is not None}
     for name, value in given.items():
         try:
             Quality(**{name: value})
@@ -36,11 +41,11 @@ def with_flags(
     )
     changed = config.seen_by(visibility)
     if given:
-        # What a budget was met with is no longer what is drawn.
+        # The budget was met with other settings.
         changed = replace(changed, quality=replace(changed.quality, **given, budget=None))
     return changed, notes
 
 
 def _is_default(name: str, value: object) -> bool:
-    """Whether a config says no more than a file without the key would."""
+    """Whether `value` is what a config without this key has."""
     return getattr(TunedConfig(), name, getattr(Quality(), name, None)) == value

@@ -1,4 +1,4 @@
-"""`vpltune render`: one image, or one layer of it, drawn by the runtime."""
+"""`vpltune render`: draws an image, one of its layers, or a clip."""
 
 import math
 from pathlib import Path
@@ -38,9 +38,9 @@ if TYPE_CHECKING:
     from vpltune.renderer.scene.views import View
 
 LARGEST_DYNAMIC_LIGHT_COUNT = 1_000_000
-"""The largest number that `--dynamic-lights` takes."""
+"""Most dynamic lights. A choice."""
 DYNAMIC_LIGHT_SEED = 0
-"""The seed of their places and directions: one command draws one image."""
+"""Seed of their positions and motion, fixed so that a command always draws the same image. A choice."""
 
 
 @takes_view_flags
@@ -52,13 +52,13 @@ def render(
             "-o",
             "--output",
             metavar="OUT",
-            help="A .png for display, or an .exr of linear float32; with --frames, an .mp4 or a folder.",
+            help="A .png for display, or a linear float32 .exr; with --frames, an .mp4 or a folder.",
         ),
     ],
     config: Annotated[
         str, typer.Option(metavar="FILE", help="A tuned config, `default` or `auto`.")
     ] = "default",
-    layer: Annotated[Layer, typer.Option(help="Which image to draw.")] = "final",
+    layer: Annotated[Layer, typer.Option(help="Layer to write.")] = "final",
     size: ImageSizeOption = None,
     visibility: VisibilityOption = None,
     interleave: InterleaveOption = None,
@@ -67,25 +67,21 @@ def render(
     rsm_resolution: RsmResolutionOption = None,
     dynamic_lights: Annotated[
         int,
-        typer.Option(
-            metavar="N", min=0, max=LARGEST_DYNAMIC_LIGHT_COUNT, help="Add N small lights that fly about."
-        ),
+        typer.Option(metavar="N", min=0, max=LARGEST_DYNAMIC_LIGHT_COUNT, help="Add N small moving lights."),
     ] = 0,
-    frames: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Draw a clip: N frames of the scene in motion.")
-    ] = None,
+    frames: Annotated[int | None, typer.Option(metavar="N", min=1, help="Draw a clip of N frames.")] = None,
     fps: Annotated[float, typer.Option(metavar="F", help="Frames per second of the clip.")] = 30.0,
     motion: Annotated[
-        Motion, typer.Option(help="What moves besides the scene's animation; auto: both where it has none.")
+        Motion, typer.Option(help="What moves besides the scene's animation; auto: both if it has none.")
     ] = "auto",
-    scale: Annotated[float, typer.Option(help="Draw scene, camera and light this much larger.")] = 1.0,
+    scale: Annotated[float, typer.Option(help="Scale scene, camera and light by this factor.")] = 1.0,
     views: ViewsFileOption = None,
     view: ViewNameOption = None,
     *,
     flags: ViewFlags,
     json: JsonOption = False,
 ) -> Report:
-    """Draw a scene with a config, headless."""
+    """Draw a scene with a config, without a window."""
     from vpltune.cli.chosen_view import chosen_view
     from vpltune.cli.quality_flags import with_flags
     from vpltune.cli.render_clip import write_clip
@@ -93,7 +89,7 @@ def render(
     from vpltune.renderer.files.image_file import require_extension
     from vpltune.renderer.files.video_file import check_clip_path
 
-    # All that can be refused is refused before the scene is read.
+    # Check the flags before the scene is read.
     chosen = chosen_view(views, view, size, flags)
     if frames is None:
         require_extension(output, ".png", ".exr")
@@ -152,14 +148,14 @@ def _write_layer(
     output: Path,
     bouncing: "BouncingLights | None",
 ) -> "ArtistParameters":
-    """Write one image; returns the parameters that it was drawn with."""
+    """Write one image, and return the parameters that it was drawn with."""
     from vpltune.cli.layer_display import for_display
     from vpltune.renderer.files.image_file import write_exr, write_png
     from vpltune.renderer.scene.dynamic_lights import DynamicLights
 
     lights = None if bouncing is None else DynamicLights(bouncing.records)
     if output.suffix.lower() == ".exr":
-        # The final image without its tone curve is the radiance that reaches the eye.
+        # A linear file takes the radiance of the final image, without exposure and tone curve.
         pixels = (
             runtime.render_radiance(view, config, lights=lights)
             if layer == "final"

@@ -1,4 +1,4 @@
-"""`vpltune render --frames`: the frames of a clip, drawn and written one by one."""
+"""`vpltune render --frames`: draws and writes the frames of a clip one by one."""
 
 from pathlib import Path
 
@@ -27,7 +27,22 @@ def write_clip(
     fps: float,
     bouncing: BouncingLights | None,
 ) -> None:
-    """Write the frames at times 0, 1/fps, 2/fps, …; all have the exposure of the first."""
+    """Write a clip: frames at the times 0, 1/fps, 2/fps, … seconds, all with the exposure of the first.
+
+    Args:
+        runtime: draws the scene; its pose is changed.
+        config: the config to draw with.
+        sequence: pose and view at each time.
+        layer: the layer to write.
+        output: an .mp4, or a folder for .png files.
+        frame_count: number of frames.
+        fps: frames per second.
+        bouncing: dynamic lights, moved from frame to frame; None for none.
+
+    Raises:
+        InputError: the output cannot be written to.
+        MachineError: the GPU ran out of memory or reported an error.
+    """
     state = ClipState()
     lights = None if bouncing is None else DynamicLights(bouncing.records)
     first = sequence.at(0.0)
@@ -50,7 +65,7 @@ def write_clip(
 def _exposure(
     runtime: Runtime, config: TunedConfig, view: View, layer: Layer, lights: DynamicLights | None
 ) -> float | None:
-    """The exposure that a view would be shown with; None for layers that are not exposed."""
+    """The exposure that a view is displayed with; None for layers without exposure."""
     if layer == "final":
         return runtime.draw(view, config, lights=lights).read_exposure()
     if layer in ("direct", "indirect", "irradiance"):

@@ -1,4 +1,4 @@
-"""What a command hands back, and how it reaches the user: one JSON object, or text and tables."""
+"""The result of a command, and how it is printed: as one JSON object, or as text and tables."""
 
 import contextlib
 import os
@@ -10,7 +10,8 @@ from typing import Any
 from vpltune.cli.verbosity import say
 from vpltune.renderer.files.strict_json import strict_json
 
-# Exit codes. DEFECT: an error that the program does not foresee.
+# Exit codes of `vpltune`. DEFECT is for unexpected exceptions. 2 is typer's for wrong arguments, and
+# 130 = 128 + SIGINT the shells' for Ctrl-C.
 OK = 0
 DEFECT = 1
 BAD_INPUT = 2
@@ -21,18 +22,18 @@ INTERRUPTED = 130
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """The outcome of a command."""
+    """The result of a command."""
 
     document: Mapping[str, Any]
-    """What `--json` prints."""
+    """Printed with `--json`."""
     shown: tuple[Any, ...]
-    """What is printed without it: strings (rich markup) and rich tables."""
+    """Printed without `--json`: strings with rich markup, and rich tables."""
     exit_code: int = OK
 
 
 @contextlib.contextmanager
 def stdout_sent_to_stderr() -> Iterator[None]:
-    """Everything that would reach stdout goes to stderr, a library's own printing from C included."""
+    """Send everything that is written to stdout to stderr, output of C libraries included."""
     sys.stdout.flush()
     kept = os.dup(1)
     os.dup2(2, 1)

@@ -1,4 +1,4 @@
-"""`vpltune report`: a page to look at, for a fit or for a library of them."""
+"""`vpltune report`: writes HTML pages for a fit or a batch."""
 
 from pathlib import Path
 from typing import Annotated
@@ -15,7 +15,7 @@ def report(
     ],
     json: JsonOption = False,
 ) -> Report:
-    """Write a page to look at: DIR/report.html for a fit; for a batch, DIR/index.html and one a scene."""
+    """Write an HTML report: DIR/report.html for a fit; for a batch, DIR/index.html and a page per scene."""
     from rich.markup import escape
 
     from vpltune.cli.progress_display import shown_progress

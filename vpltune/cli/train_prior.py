@@ -1,4 +1,4 @@
-"""`vpltune train-prior`: learns the parameters as a function of the scene: how `--config auto` is made."""
+"""`vpltune train-prior`: trains the prior of `--config auto`, which predicts parameters from a scene."""
 
 from pathlib import Path
 from typing import Annotated
@@ -13,23 +13,21 @@ from vpltune.cli.report import Report
 def train_prior(
     output: Annotated[
         Path,
-        typer.Option(
-            "-o", "--output", metavar="OUT.json", help="The config; its card goes beside it, as .md."
-        ),
+        typer.Option("-o", "--output", metavar="OUT.json", help="Config to write; its model card is OUT.md."),
     ],
     library: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[LIBRARY]", help="A folder of scenes, or a list of them in a file.", show_default=False
+            metavar="[LIBRARY]", help="A folder of scenes, or a file with one per line.", show_default=False
         ),
     ] = None,
     generated: Annotated[
-        int, typer.Option(metavar="N", min=0, max=10_000, help="How many scenes to generate.")
+        int, typer.Option(metavar="N", min=0, max=10_000, help="Number of scenes to generate.")
     ] = 32,
     seed: SeedOption = 0,
     json: JsonOption = False,
 ) -> Report:
-    """Learn from many scenes how parameters follow from what the GPU measures; write config and card."""
+    """Train the prior of `--config auto` on many scenes; write a config and its model card."""
     from rich.markup import escape
 
     from vpltune.cli.progress_display import shown_progress

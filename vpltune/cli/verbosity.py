@@ -1,4 +1,4 @@
-"""How much is said on stderr: `--quiet`, `--verbose`, or neither of them. Errors are always said."""
+"""How much is printed on stderr, by `--quiet` and `--verbose`. Errors are always printed."""
 
 import logging
 import sys
@@ -12,15 +12,15 @@ _chosen: Verbosity = "normal"
 
 
 def reset_verbosity() -> None:
-    """As if neither flag was given."""
+    """Return to the verbosity without flags."""
     _choose("normal")
 
 
 def choose_verbosity(quiet: bool, verbose: bool) -> None:
-    """What one place of the command line says; the flags stand before the command or after it.
+    """Set the verbosity by the flags at one place of the command line, before the command or after it.
 
     Raises:
-        InputError: both flags are given.
+        InputError: both flags are given, at one place or at two.
     """
     if (quiet or is_quiet()) and (verbose or is_verbose()):
         raise InputError("--quiet and --verbose: only one of them can be given")
@@ -29,12 +29,12 @@ def choose_verbosity(quiet: bool, verbose: bool) -> None:
 
 
 def is_quiet() -> bool:
-    """Whether stderr gets errors alone."""
+    """Whether only errors are printed."""
     return _chosen == "quiet"
 
 
 def is_verbose() -> bool:
-    """Whether stderr gets times, versions, drivers and tracebacks."""
+    """Whether times, versions, drivers and tracebacks are printed."""
     return _chosen == "verbose"
 
 
@@ -51,12 +51,12 @@ def detail(text: object) -> None:
 
 
 def one_line(text: object) -> str:
-    """`text` with every run of white space made one space."""
+    """`text` with each run of white space replaced by one space."""
     return " ".join(str(text).split())
 
 
 class _DetailHandler(logging.Handler):
-    """Prints what the library logs as a line of ours."""
+    """Prints log messages of the library as lines of `detail`."""
 
     def emit(self, record: logging.LogRecord) -> None:
         detail(record.getMessage())

@@ -1,4 +1,4 @@
-"""Camera and light from flags: what may be given together, checked in one place."""
+"""Camera and light from flags, and the rules for which flags may be given together."""
 
 import math
 
@@ -12,16 +12,16 @@ from vpltune.renderer.scene.scene import Camera, Light, look_at
 from vpltune.renderer.scene.views import check_cone
 
 DEFAULT_YFOV_DEGREES = 50.0
-"""The vertical angle of view of a camera from flags without `--yfov`."""
+"""Vertical field of view. A choice."""
 DEFAULT_CONE_DEGREES = (0.0, 45.0)
-"""KHR_lights_punctual's own defaults."""
+"""Inner and outer half angle of a spot: the defaults of KHR_lights_punctual."""
 
 
 def camera_from_flags(flags: ViewFlags) -> Camera | None:
-    """The camera that the flags describe, or None where none is given.
+    """The camera that the flags describe; None if no flag of a camera is given.
 
     Raises:
-        InputError: only part of a camera is given, or a value is out of range.
+        InputError: a flag is missing, or a value is out of range.
     """
     if flags.eye is None and flags.look_at is None and flags.yfov is None:
         return None
@@ -30,7 +30,7 @@ def camera_from_flags(flags: ViewFlags) -> Camera | None:
     eye = _vector(flags.eye, "--eye")
     target = _vector(flags.look_at, "--look-at")
     if (eye == target).all():
-        raise InputError(f"--look-at: must differ from --eye, got {flags.look_at} twice")
+        raise InputError(f"--look-at: must differ from --eye, got {flags.look_at} for both")
     yfov = DEFAULT_YFOV_DEGREES if flags.yfov is None else flags.yfov
     if not 1.0 <= yfov <= 170.0:
         raise InputError(f"--yfov: must be from 1 to 170 degrees, got {yfov}")
@@ -38,10 +38,10 @@ def camera_from_flags(flags: ViewFlags) -> Camera | None:
 
 
 def light_from_flags(flags: ViewFlags) -> Light | None:
-    """The light that the flags describe, or None where none is given.
+    """The light that the flags describe; None if no flag of a light is given.
 
     Raises:
-        InputError: a flag is missing for its type or does not go with it, or a value is out of range.
+        InputError: a flag is missing, does not belong to the type of light, or has a value out of range.
     """
     given = {
         "--light-position": flags.light_position,
@@ -81,14 +81,14 @@ def _intensity(text: str | None) -> Float64[np.ndarray, "3"]:
 
 def _position(flags: ViewFlags) -> Float64[np.ndarray, "3"]:
     if flags.light_position is None:
-        raise InputError(f"--light-position: a {flags.light_type} light needs it")
+        raise InputError(f"--light-position: must be given for a {flags.light_type} light")
     return _vector(flags.light_position, "--light-position")
 
 
 def _direction(flags: ViewFlags) -> Float64[np.ndarray, "3"]:
     if (flags.light_direction is None) == (flags.light_look_at is None):
         raise InputError(
-            f"--light-direction: a {flags.light_type} light needs either it or --light-look-at, and not both"
+            f"--light-direction: a {flags.light_type} light needs either this or --light-look-at, not both"
         )
     if flags.light_direction is not None:
         flag, direction = "--light-direction", _vector(flags.light_direction, "--light-direction")
@@ -99,7 +99,7 @@ def _direction(flags: ViewFlags) -> Float64[np.ndarray, "3"]:
         )
     length = float(np.linalg.norm(direction))
     if not length > 0.0:
-        raise InputError(f"{flag}: gives the light no direction")
+        raise InputError(f"{flag}: must give the light a direction, got a vector of length 0")
     return direction / length
 
 

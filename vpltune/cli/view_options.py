@@ -1,23 +1,23 @@
-"""The options that say which view a command draws or fits: one definition of each, for every command."""
+"""The options for the view that a command draws or fits, defined once for all commands."""
 
 import functools
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
 from vpltune.cli.report import Report
 
-VIEW_PANEL = "Camera and light, in world units (else: the scene's own, or chosen)"
+VIEW_PANEL = "Camera and light, in world units (default: the scene's own, or placed automatically)"
 
-ImageSizeOption = Annotated[str | None, typer.Option(metavar="WxH", help="Image size. [960x540]")]
+ImageSizeOption = Annotated[str | None, typer.Option(metavar="WxH", help="Image size, in pixels. [960x540]")]
 ViewsFileOption = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Take camera, lights and size from a views.json.")
 ]
-ViewNameOption = Annotated[str | None, typer.Option(metavar="NAME", help="Which of its views.")]
+ViewNameOption = Annotated[str | None, typer.Option(metavar="NAME", help="View of the --views file.")]
 
 
 def _view_option(metavar: str, description: str) -> typer.models.OptionInfo:
@@ -26,34 +26,34 @@ def _view_option(metavar: str, description: str) -> typer.models.OptionInfo:
 
 @dataclass(frozen=True)
 class ViewFlags:
-    """Camera and light as given on the command line; None where absent."""
+    """Camera and light as given on the command line; None if a flag is absent."""
 
-    eye: Annotated[str | None, _view_option("X,Y,Z", "Where the camera stands.")] = None
-    look_at: Annotated[str | None, _view_option("X,Y,Z", "What it looks at, with +Y up.")] = None
-    yfov: Annotated[float | None, _view_option("DEG", "Vertical angle of view, in degrees. [50]")] = None
+    eye: Annotated[str | None, _view_option("X,Y,Z", "Position of the camera.")] = None
+    look_at: Annotated[str | None, _view_option("X,Y,Z", "Point it looks at, with +Y up.")] = None
+    yfov: Annotated[float | None, _view_option("DEG", "Vertical field of view, in degrees. [50]")] = None
     light_type: Annotated[
         Literal["spot", "point", "directional"] | None, _view_option("TYPE", "spot, point or directional.")
     ] = None
-    light_position: Annotated[str | None, _view_option("X,Y,Z", "Where a spot or point light stands.")] = None
-    light_look_at: Annotated[str | None, _view_option("X,Y,Z", "What the light points at.")] = None
-    light_direction: Annotated[str | None, _view_option("X,Y,Z", "The way the light travels.")] = None
+    light_position: Annotated[str | None, _view_option("X,Y,Z", "Position of a spot or point light.")] = None
+    light_look_at: Annotated[str | None, _view_option("X,Y,Z", "Point that the light is aimed at.")] = None
+    light_direction: Annotated[str | None, _view_option("X,Y,Z", "Direction the light travels in.")] = None
     light_intensity: Annotated[
         str | None, _view_option("I or R,G,B", "W/sr (spot, point) or W/m² (directional). [1]")
     ] = None
     light_cone: Annotated[
-        str | None, _view_option("INNER,OUTER", "A spot's half angles, in degrees. [0,45]")
+        str | None, _view_option("INNER,OUTER", "Half angles of a spot, in degrees. [0,45]")
     ] = None
 
 
 def takes_view_flags(command: Callable[..., Report]) -> Callable[..., Report]:
-    """A command whose parameter `flags: ViewFlags` is one option a field on the command line.
+    """Decorate a command: its parameter `flags: ViewFlags` becomes one command-line option for each field.
 
-    typer reads a command's options from its signature: there, the fields stand where `flags` did.
+    typer reads the options from the signature of the command, so the signature is changed.
     """
     names = [field.name for field in fields(ViewFlags)]
 
     @functools.wraps(command)
-    def with_options(**given: object) -> Report:
+    def with_options(**given: Any) -> Report:
         flags = ViewFlags(**{name: given.pop(name) for name in names})
         return command(**given, flags=flags)
 
@@ -66,6 +66,8 @@ def takes_view_flags(command: Callable[..., Report]) -> Callable[..., Report]:
             ]
         else:
             parameters.append(parameter)
-    with_options.__signature__ = inspect.Signature(parameters, return_annotation=Report)
-    with_options.__annotations__ = {each.name: each.annotation for each in parameters}
-    return with_options
+    # `Any`: the type of a function has no signature of its own to set.
+    typed: Any = with_options
+    typed.__signature__ = inspect.Signature(parameters, return_annotation=Report)
+    typed.__annotations__ = {each.name: each.annotation for each in parameters}
+    return typed

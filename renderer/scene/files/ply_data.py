@@ -2,6 +2,7 @@
 
 import struct
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -16,7 +17,11 @@ _TYPES = {
     "double": "d", "float64": "d",
 }  # fmt: skip
 # Byte orders of the struct module by the name of the format; ASCII has none.
-_BYTE_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
+_BYTE_ORDERS: dict[str, Literal["<", ">", ""]] = {
+    "binary_little_endian": "<",
+    "binary_big_endian": ">",
+    "ascii": "",
+}
 # A choice: most bytes of a header.
 _LONGEST_HEADER = 1 << 16
 # A choice: most characters of a number in ASCII data.
@@ -45,7 +50,7 @@ class PlyElement:
 class PlyHeader:
     """A parsed header."""
 
-    byte_order: str
+    byte_order: Literal["<", ">", ""]
     """"<" or ">"; empty for ASCII."""
     elements: list[PlyElement]
     texture_name: str
@@ -109,7 +114,7 @@ class PlyData:
         self._order = header.byte_order
         self._decoded = decoded
         self._at = 0
-        self._source = (
+        self._source: bytes | np.ndarray = (
             content[header.size :] if header.byte_order else _ascii_numbers(content[header.size :], decoded)
         )
 
@@ -179,7 +184,7 @@ class PlyData:
                     raise SceneFileError(
                         f"element '{element.name:.40}': its {element.count} rows are cut off"
                     )
-                if self._order:
+                if isinstance(self._source, bytes):
                     values[p.name] += struct.unpack_from(
                         f"{self._order}{length}{p.type}", self._source, self._at
                     )
@@ -204,7 +209,9 @@ class PlyData:
         if at + self._width(type_) > len(self._source):
             raise SceneFileError(f"element '{element.name:.40}': its {element.count} rows are cut off")
         number = (
-            struct.unpack_from(self._order + type_, self._source, at)[0] if self._order else self._source[at]
+            struct.unpack_from(self._order + type_, self._source, at)[0]
+            if isinstance(self._source, bytes)
+            else self._source[at]
         )
         if not 0 <= number <= len(self._source) or number != int(number):
             raise SceneFileError(
@@ -215,10 +222,10 @@ class PlyData:
     def _column(
         self, at: int, type_: str, length: int, row: int, count: int
     ) -> Float64[np.ndarray, "rows length"]:
-        if not self._order:
+        if not isinstance(self._source, bytes):
             rows = self._source[self._at : self._at + row * count].reshape(count, row)
             return rows[:, at - self._at : at - self._at + length]
-        dtype = np.dtype(type_).newbyteorder(self._order)
+        dtype = np.dtype(self._order + type_)
         return np.ndarray((count, length), dtype, self._source, at, (row, dtype.itemsize)).astype(np.float64)
 
 

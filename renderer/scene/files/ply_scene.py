@@ -51,7 +51,8 @@ def read_ply(path: Path, warnings: Warnings) -> Scene:
     surface = _surface(elements.get("vertex", {}), elements.get("face", {}), warnings)
     name = label(path.stem, "mesh")
     mesh = None if surface is None else finished_mesh(surface, name, 0, decoded, "element 'face'")
-    textures = () if mesh is None or surface.uv is None else _textures(header, folder, warnings)
+    has_uv = surface is not None and surface.uv is not None
+    textures = () if mesh is None or not has_uv else _textures(header, folder, warnings)
     if header.texture_name and not textures:
         warnings.add(f"texture {header.texture_name!r:.80} is not used; white is used instead")
     return Scene(

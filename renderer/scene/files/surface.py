@@ -122,6 +122,7 @@ def _flat(
 def _smooth(
     surface: Surface, face_normals: Float32[np.ndarray, "triangles 3"]
 ) -> tuple[Surface, Float32[np.ndarray, "vertices 3"]]:
+    assert surface.normals is not None
     normals, has_normal = unit_rows(surface.normals.astype(np.float64))
     lacking = ~has_normal[surface.triangles]
     if not lacking.any():

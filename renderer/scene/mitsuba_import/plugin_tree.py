@@ -1,5 +1,6 @@
 """Mitsuba's XML as a tree of plugins: defaults substituted, references resolved, names in snake_case."""
 
+import builtins
 import re
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -84,7 +85,8 @@ class Plugin:
         """All children of a kind, in document order."""
         return [plugin for _, plugin in self.children if plugin.kind == kind]
 
-    def _value(self, name: str, kind: type[V], expected: str, absent: V) -> V:
+    # `type` is a field of the plugin here.
+    def _value(self, name: str, kind: builtins.type[V], expected: str, absent: V) -> V:
         value = self.values.get(name, absent)
         if not isinstance(value, kind):
             raise SceneFileError(f"{self.where}: '{name}' must be {expected}")

@@ -72,13 +72,17 @@ def _from_file(shape: Plugin, path: Path, folder: SceneFolder, warnings: Warning
     surface = _joined(meshes)
     if shape.type == "ply" and surface.uv is not None:
         # Our PLY reader flips v, as most programs that write PLY expect. Mitsuba does not, so undo it.
-        surface = replace(surface, uv=surface.uv * np.float32((1, -1)) + np.float32((0, 1)))
+        surface = replace(surface, uv=_flipped_v(surface.uv))
     flipped = shape.flag("flip_tex_coords", shape.type == "obj")
     if flipped != (shape.type == "obj") and surface.uv is not None:
-        surface = replace(surface, uv=surface.uv * np.float32((1, -1)) + np.float32((0, 1)))
+        surface = replace(surface, uv=_flipped_v(surface.uv))
     if shape.flag("face_normals", False):
         return replace(surface, normals=None)
     return _smoothed(surface) if _is_flat(surface) else surface
+
+
+def _flipped_v(uv: np.ndarray) -> np.ndarray:
+    return uv * np.array((1, -1), np.float32) + np.array((0, 1), np.float32)
 
 
 def _joined(meshes: tuple[Mesh, ...]) -> Surface:
@@ -94,8 +98,10 @@ def _joined(meshes: tuple[Mesh, ...]) -> Surface:
 
 def _is_flat(surface: Surface) -> bool:
     """Whether every corner has its triangle's normal, as our readers set it if the file has no normals."""
-    return len(surface.positions) == surface.triangles.size and bool(
-        (surface.normals[surface.triangles] == surface.normals[surface.triangles[:, :1]]).all()
+    normals, triangles = surface.normals, surface.triangles
+    assert normals is not None
+    return len(surface.positions) == triangles.size and bool(
+        (normals[triangles] == normals[triangles[:, :1]]).all()
     )
 
 
@@ -104,6 +110,7 @@ def _smoothed(surface: Surface) -> Surface:
 
     Mitsuba does the same for files without normals. Vertices are equal if position and uv are.
     """
+    assert surface.uv is not None
     keys = np.concatenate([surface.positions, surface.uv], axis=1)
     _, first, vertex = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     triangles = vertex.reshape(-1)[surface.triangles]

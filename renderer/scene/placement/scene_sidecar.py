@@ -30,7 +30,7 @@ from vpltune.renderer.scene.placement.automatic_camera import default_camera, de
 from vpltune.renderer.scene.placement.automatic_light import default_light
 from vpltune.renderer.scene.placement.free_space import free_space
 from vpltune.renderer.scene.placement.sight import lit_fraction, seen_by
-from vpltune.renderer.scene.scene import Camera, Light, Scene, look_at
+from vpltune.renderer.scene.scene import Camera, Light, LightKind, Scene, look_at
 from vpltune.renderer.scene.views import check_cone
 
 # A choice: vertical field of view if a camera gives none.
@@ -40,7 +40,7 @@ DEFAULT_CONE_DEGREES = {"inner_cone_degrees": 35.0, "outer_cone_degrees": 55.0}
 # The keys that a camera may have; any other is rejected.
 CAMERA_KEYS = ("eye", "look_at", "yfov_degrees")
 # The keys that each type of light may have; any other is rejected.
-LIGHT_KEYS = {
+LIGHT_KEYS: dict[LightKind, tuple[str, ...]] = {
     "spot": ("type", "position", "direction", "look_at", "intensity", *DEFAULT_CONE_DEGREES),
     "point": ("type", "position", "intensity"),
     "directional": ("type", "direction", "look_at", "position", "intensity"),

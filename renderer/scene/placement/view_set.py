@@ -92,13 +92,16 @@ def views_for_scene(
     sight = seen_by(space, camera)
     start = _Start(space, camera, lights, sight, lit_fraction(space, sight, lights))
     views = [View("fitted_0", "fitted", size, camera, lights)]
-    splits: list[tuple[Split, int]] = [("fitted", i) for i in range(1, fitted)]
-    splits += [("validation", i) for i in range(validation)]
-    splits += [("held_out", i) for i in range(held_out)]
-    for split, index in splits:
-        random = np.random.default_rng([seed, _STREAMS[split], index])
-        moved_camera, moved_lights = _moved(start, random)
-        views.append(View(f"{split}_{index}", split, size, moved_camera, moved_lights))
+    splits: dict[Split, range] = {
+        "fitted": range(1, fitted),
+        "validation": range(validation),
+        "held_out": range(held_out),
+    }
+    for split, indices in splits.items():
+        for index in indices:
+            random = np.random.default_rng([seed, _STREAMS[split], index])
+            moved_camera, moved_lights = _moved(start, random)
+            views.append(View(f"{split}_{index}", split, size, moved_camera, moved_lights))
     return tuple(views)
 
 

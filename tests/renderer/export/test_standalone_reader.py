@@ -160,7 +160,7 @@ def test_a_bundle_is_json_that_describes_its_bytes(tmp_path):
     [
         (["--to", "bundle"], "--scene: must be given with --to bundle"),
         (["--to", "json", "--size", "4x4"], "--to json: takes no camera, light, view or size"),
-        (["--to", "c", "--scene", "a.glb"], "--scene: --to c takes none"),
+        (["--to", "c", "--scene", "a.glb"], "--scene: cannot be given with --to c"),
     ],
 )
 def test_what_does_not_go_together_is_refused(tmp_path, capfd, arguments, message):

@@ -5,6 +5,7 @@ import pytest
 from built_scenes import quad, scene_of
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.point_table import POISSON_RADIUS, point_table, poisson_disc, r2_sequence
 from vpltune.renderer.frame.runtime import Runtime
@@ -58,13 +59,13 @@ def deviation(gl_context, table: str, density_exponent: float) -> float:
     view = View("clumps", "fitted", (48, 36), camera, (light,))
     runtime = Runtime(
         scene_of([wall, floor], [(0.8, 0.15, 0.1), (0.7, 0.7, 0.7)]),
-        TunedConfig(ArtistParameters(vpl_count=256, density_exponent=density_exponent)),
         RuntimeOptions(point_table=table),
         context=gl_context,
-        rsm_resolution=256,
     )
-    rotations = np.random.default_rng(0).random((64, 2))
-    frames = [runtime.capture(view, (float(u), float(v))) for u, v in rotations]
+    parameters = ArtistParameters(vpl_count=256, density_exponent=density_exponent)
+    config = TunedConfig(parameters, quality=Quality(rsm_resolution=256))
+    rotations = [(float(u), float(v)) for u, v in np.random.default_rng(0).random((64, 2))]
+    frames = runtime.captures(view, config, rotations)
     seen = frames[0].valid & (frames[0].normal_world[..., 1] > 0.9)
     irradiance = np.stack([frame.vpl_irradiance[seen] for frame in frames])
     return float(irradiance.std(axis=0).mean() / irradiance.mean())

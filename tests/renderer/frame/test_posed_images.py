@@ -15,7 +15,7 @@ from vpltune.renderer.scene.scene import Camera, Instance, Mesh, look_at
 from vpltune.renderer.scene.views import View
 
 # Visibility maps see a skin as rigid pieces, see renderer/gpu/ray_hierarchy.py.
-WITHOUT_MAPS = TunedConfig(visibility="none")
+WITHOUT_MAPS = TunedConfig(visibility="transmittance")
 BUFFERS = ("position_world", "normal_world", "direct_irradiance", "indirect_irradiance")
 
 
@@ -41,10 +41,10 @@ def test_set_pose_is_a_scene_built_there(gl_context):
         ),
     )
     runtime = Runtime(scene, context=gl_context)
-    at_rest = runtime.capture(room_view())
+    at_rest = runtime.capture(room_view(), TunedConfig())
     runtime.scene_buffers.set_pose(transforms, np.zeros((0, 4, 4)))
-    moved = runtime.capture(room_view())
-    compare(moved, Runtime(built, context=gl_context).capture(room_view()))
+    moved = runtime.capture(room_view(), TunedConfig())
+    compare(moved, Runtime(built, context=gl_context).capture(room_view(), TunedConfig()))
     assert np.abs(moved.indirect_irradiance - at_rest.indirect_irradiance).max() > 1e-2
 
 
@@ -64,7 +64,7 @@ def blended_mesh(mesh: Mesh, joint_matrices) -> Mesh:
 def test_skins_bend_on_the_gpu_as_on_paper(gl_context, light):
     """Camera and light both see the bent board: depth and VPLs are those of the board bent in numpy."""
     scene = bent_board()
-    runtime = Runtime(scene, WITHOUT_MAPS, context=gl_context)
+    runtime = Runtime(scene, context=gl_context)
     pose = AnimationPlayer(scene).pose_at(0.4)
     runtime.scene_buffers.set_pose(pose.transforms, pose.joint_matrices)
     baked = dataclasses.replace(
@@ -76,8 +76,11 @@ def test_skins_bend_on_the_gpu_as_on_paper(gl_context, light):
         animation=None,
     )
     view = room_view(light)
-    bent, expected = runtime.capture(view), Runtime(baked, WITHOUT_MAPS, context=gl_context).capture(view)
-    changed = np.abs(bent.depth - Runtime(colored_room(), context=gl_context).capture(view).depth) > 1e-3
+    bent, expected, still = (
+        drawing.capture(view, WITHOUT_MAPS)
+        for drawing in (runtime, *(Runtime(other, context=gl_context) for other in (baked, colored_room())))
+    )
+    changed = np.abs(bent.depth - still.depth) > 1e-3
     assert changed.mean() > 0.01, "the board did not move"
     # A silhouette may fall on the other side of a pixel's centre.
     same = np.abs(bent.depth - expected.depth) <= 1e-4 * expected.depth.max()
@@ -119,7 +122,7 @@ def test_skinned_corpus_at_rest_is_drawn_as_it_was_baked(corpora_folder, gl_cont
         middle, reach = (low + high) / 2.0, np.linalg.norm(high - low)
         camera = Camera(look_at(middle + np.array([0.3, 0.2, 1.6]) * reach, middle), 0.8)
         view = View("skin", "fitted", (48, 48), camera, (ROOM_LIGHTS["directional"],))
-        drawn, expected = (Runtime(s, WITHOUT_MAPS, context=gl_context).capture(view) for s in (scene, baked))
+        drawn, expected = (Runtime(s, context=gl_context).capture(view, WITHOUT_MAPS) for s in (scene, baked))
         assert expected.valid.any(), path.name
         assert (drawn.valid == expected.valid).mean() > 0.998, path.name
         both = drawn.valid & expected.valid

@@ -4,22 +4,25 @@ import numpy as np
 import pytest
 from built_scenes import colored_room, room_view
 
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import LAYERS, Runtime
+
+CONFIG = TunedConfig()
 
 
 def test_runtimes_do_not_disturb_each_other():
     """Two runtimes with contexts of their own, used in turn, draw what each drew alone."""
-    first = Runtime(colored_room(), "default")
-    alone = first.render(room_view("spot"), "irradiance")
-    second = Runtime(colored_room(), "default")
-    other = second.render(room_view("point"), "irradiance")
-    np.testing.assert_array_equal(first.render(room_view("spot"), "irradiance"), alone)
-    np.testing.assert_array_equal(second.render(room_view("point"), "irradiance"), other)
+    first = Runtime(colored_room())
+    alone = first.render(room_view("spot"), CONFIG, layer="irradiance")
+    second = Runtime(colored_room())
+    other = second.render(room_view("point"), CONFIG, layer="irradiance")
+    np.testing.assert_array_equal(first.render(room_view("spot"), CONFIG, layer="irradiance"), alone)
+    np.testing.assert_array_equal(second.render(room_view("point"), CONFIG, layer="irradiance"), other)
 
 
 @pytest.mark.parametrize("layer", LAYERS)
 def test_every_layer_has_its_shape_and_values(gl_context, layer):
-    image = Runtime(colored_room(), "default", context=gl_context).render(room_view("spot"), layer)
+    image = Runtime(colored_room(), context=gl_context).render(room_view("spot"), CONFIG, layer=layer)
     assert image.shape == ((48, 64) if layer == "depth" else (48, 64, 3))
     assert image.dtype == (np.uint8 if layer == "final" else np.float32)
     assert np.isfinite(image).all()
@@ -30,19 +33,19 @@ def test_an_object_released_by_hand_does_no_harm(gl_context):
     """moderngl's own collection stops at one; making the next frame must not."""
     gl_context.buffer(reserve=16).release()
     for size in ((16, 12), (20, 12)):
-        Runtime(colored_room(), "default", context=gl_context).render(room_view("spot", size), "albedo")
+        Runtime(colored_room(), context=gl_context).render(room_view("spot", size), CONFIG, layer="albedo")
 
 
 def test_direct_and_indirect_add_up(gl_context):
     """Radiance is linear in light: the two layers sum to the whole, to float32's rounding."""
-    runtime = Runtime(colored_room(), "default", context=gl_context)
-    parts = runtime.render(room_view("spot"), "direct") + runtime.render(room_view("spot"), "indirect")
-    np.testing.assert_allclose(parts, runtime.render_radiance(room_view("spot")), rtol=1e-5, atol=1e-7)
+    runtime, view = Runtime(colored_room(), context=gl_context), room_view("spot")
+    parts = sum(runtime.render(view, CONFIG, layer=layer) for layer in ("direct", "indirect"))
+    np.testing.assert_allclose(parts, runtime.render_radiance(view, CONFIG), rtol=1e-5, atol=1e-7)
 
 
 def test_white_maps_to_white_and_black_to_black(gl_context):
     """The tone curve's ends; and an even grey keeps equal channels."""
-    runtime = Runtime(colored_room(), "default", context=gl_context)
+    runtime = Runtime(colored_room(), context=gl_context)
     for level, low, high in ((1e4, 250, 255), (0.0, 0, 0)):
         shown = runtime.display(np.full((4, 4, 3), level, np.float32), 1.0)
         assert shown.min() >= low
@@ -53,7 +56,7 @@ def test_white_maps_to_white_and_black_to_black(gl_context):
 
 def test_measured_exposure_does_not_depend_on_the_light_level(gl_context):
     """An image a thousand times as bright is shown the same, to one step of 8 bits."""
-    runtime = Runtime(colored_room(), "default", context=gl_context)
-    radiance = runtime.render_radiance(room_view("spot"))
+    runtime = Runtime(colored_room(), context=gl_context)
+    radiance = runtime.render_radiance(room_view("spot"), CONFIG)
     dim, bright = runtime.display(radiance), runtime.display(radiance * 1000.0)
     assert np.abs(dim.astype(int) - bright.astype(int)).max() <= 1

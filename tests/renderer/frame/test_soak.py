@@ -10,6 +10,7 @@ from built_scenes import ROOM_LIGHTS
 from moving_scenes import bent_board
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
@@ -36,13 +37,10 @@ class Soak:
 
     def __init__(self, context):
         self.scene = bent_board(seconds_per_turn=4.0)
-        config = TunedConfig(
-            ArtistParameters(
-                **{**ArtistParameters().as_dict(), "vpl_count": 64, "screen_space_strength": 1.0}
-            )
-        )
-        options = RuntimeOptions(interleave=2, light_path="tiles")
-        self.runtime = Runtime(self.scene, config, options, rsm_resolution=32, context=context)
+        # The smallest map that a config may ask for.
+        quality = Quality(interleave=2, rsm_resolution=64)
+        self.config = TunedConfig(ArtistParameters(vpl_count=64, screen_space_strength=1.0), quality=quality)
+        self.runtime = Runtime(self.scene, RuntimeOptions(light_path="tiles"), context=context)
         camera = Camera(look_at(np.array([0.0, 0.0, 3.6]), np.zeros(3)), float(np.radians(40.0)))
         lights = tuple(ROOM_LIGHTS[kind] for kind in ("spot", "point", "directional"))
         self.sequence = Sequence(self.scene, View("soak", "fitted", (32, 24), camera, lights), "both")
@@ -53,7 +51,7 @@ class Soak:
     def draw(self, frame: int) -> None:
         moment = self.sequence.at(frame / FPS)
         self.runtime.pose(moment.pose)
-        self.runtime.draw(moment.view, lights=self.lights)
+        self.runtime.draw(moment.view, self.config, lights=self.lights)
         self.bouncing.advance(1.0 / FPS)
         self.lights.update(self.bouncing.records)
 
@@ -61,7 +59,7 @@ class Soak:
         moment = self.sequence.at(0.0)
         self.runtime.pose(moment.pose)
         lights = DynamicLights(self.first_records)
-        return self.runtime.render_radiance(moment.view, lights).copy()
+        return self.runtime.render_radiance(moment.view, self.config, lights=lights).copy()
 
 
 @pytest.mark.parametrize("frames", [300, pytest.param(10_000, marks=pytest.mark.slow)])
@@ -80,6 +78,6 @@ def test_soak(gl_context, frames):
     growth = resident_bytes() - settled
     assert growth <= LARGEST_GROWTH, f"{growth / 1024:.0f} KiB since frame {settled_at}"
     assert gl_context.error == "GL_NO_ERROR"
-    moved = soak.runtime.render_radiance(soak.sequence.at(1.0).view)
+    moved = soak.runtime.render_radiance(soak.sequence.at(1.0).view, soak.config)
     assert np.abs(moved - first).max() > 0.01, "nothing moved"
     np.testing.assert_array_equal(soak.first_image(), first)

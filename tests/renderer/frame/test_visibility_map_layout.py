@@ -5,22 +5,21 @@ import pytest
 from built_scenes import colored_room, room_view
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
+from vpltune.renderer.config.quality import MAP_REFINEMENTS, Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame import visibility_map_layout
 from vpltune.renderer.frame.capture import CapturedFrame
 from vpltune.renderer.frame.runtime import Runtime
-from vpltune.renderer.frame.runtime_options import REFINEMENTS, RuntimeOptions
-from vpltune.renderer.frame.visibility_map_layout import TEXEL_BYTES, VisibilityMapLayout
+from vpltune.renderer.frame.visibility_map_layout import NO_MAPS, TEXEL_BYTES, VisibilityMapLayout
 
 VIEW = room_view("spot", (32, 24))
 
 
 def room_capture(gl_context, size: int, refinement: int, vpl_count: int = 64) -> CapturedFrame:
     """The room's VPLs and light, where OpenGL has nothing to say against it."""
-    options = RuntimeOptions(visibility_map_size=size, visibility_map_refinement=refinement)
-    config = TunedConfig(ArtistParameters(vpl_count=vpl_count), visibility="maps")
-    runtime = Runtime(colored_room(), config, options, context=gl_context, rsm_resolution=256)
-    return runtime.capture(VIEW)
+    quality = Quality(map_size=size, map_refinement=refinement, rsm_resolution=256)
+    config = TunedConfig(ArtistParameters(vpl_count=vpl_count), visibility="maps", quality=quality)
+    return Runtime(colored_room(), context=gl_context).capture(VIEW, config)
 
 
 def room_light(gl_context, size: int, refinement: int, vpl_count: int = 64) -> np.ndarray:
@@ -33,7 +32,7 @@ def relative_rms(value: np.ndarray, expected: np.ndarray) -> float:
     return float(np.sqrt(np.mean((value - expected) ** 2) / np.mean(expected**2)))
 
 
-@pytest.mark.parametrize("refinement", REFINEMENTS)
+@pytest.mark.parametrize("refinement", MAP_REFINEMENTS)
 @pytest.mark.parametrize("size", [4, 64])
 def test_smallest_and_largest_maps_draw_the_room(gl_context, size, refinement):
     """Against 64² maps refined by 8: 1 % where they are as large, 30 % where 16 texels see the hemisphere."""
@@ -41,11 +40,13 @@ def test_smallest_and_largest_maps_draw_the_room(gl_context, size, refinement):
     assert relative_rms(room_light(gl_context, size, refinement), room_light(gl_context, 64, 8)) < bound
 
 
-@pytest.mark.parametrize("refinement", REFINEMENTS)
+@pytest.mark.parametrize("refinement", MAP_REFINEMENTS)
 def test_one_vpl_has_a_map(gl_context, refinement):
     """The one VPL lights most of the room, and less of it than without occluders."""
-    config = TunedConfig(ArtistParameters(vpl_count=1), visibility="none")
-    free = Runtime(colored_room(), config, context=gl_context, rsm_resolution=256).capture(VIEW)
+    config = TunedConfig(
+        ArtistParameters(vpl_count=1), visibility="transmittance", quality=Quality(rsm_resolution=256)
+    )
+    free = Runtime(colored_room(), context=gl_context).capture(VIEW, config)
     seen = room_light(gl_context, 24, refinement, vpl_count=1)
     assert 0.5 < seen.mean() / free.vpl_irradiance.mean() < 1.0
 
@@ -53,7 +54,7 @@ def test_one_vpl_has_a_map(gl_context, refinement):
 def test_in_the_dark_no_vpl_sees_anything(gl_context):
     """Without a light, and so without L, no ray is cast, no silhouette found and no NaN made."""
     config = TunedConfig(ArtistParameters(vpl_count=3), visibility="maps")
-    captured = Runtime(colored_room(), config, context=gl_context).capture(room_view(None, (16, 12)))
+    captured = Runtime(colored_room(), context=gl_context).capture(room_view(None, (16, 12)), config)
     assert not captured.vpl_irradiance.any()
     assert (captured.visibility_maps.block == -1).all()
     assert np.isfinite(captured.visibility_maps.distance).all()
@@ -75,9 +76,24 @@ def test_silhouettes_that_find_no_room_stay_coarse(gl_context, monkeypatch):
     assert 0.0 < relative_rms(crowded, refined) < 1.1 * relative_rms(unrefined, refined)
 
 
-@pytest.mark.parametrize("refinement", REFINEMENTS[1:])
+@pytest.mark.parametrize("refinement", MAP_REFINEMENTS[1:])
 @pytest.mark.parametrize(("vpl_count", "size"), [(1, 4), (1024, 24), (65536, 64)])
 def test_room_for_finer_texels_fits_a_storage_buffer(vpl_count, size, refinement):
     """2²⁷ bytes are what drivers take in one at least; and there is room for some."""
     blocks = VisibilityMapLayout(size, refinement).blocks(vpl_count)
     assert 0 < blocks * refinement**2 * TEXEL_BYTES <= 1 << 27
+
+
+def test_the_layout_is_what_the_config_asks_for():
+    config = TunedConfig(quality=Quality(map_size=12, map_refinement=2))
+    assert VisibilityMapLayout.of(config) == VisibilityMapLayout(12, 2)
+    assert VisibilityMapLayout.of(TunedConfig()) == VisibilityMapLayout(24, 4)
+    assert VisibilityMapLayout.of(config.seen_by("transmittance")) == NO_MAPS
+
+
+def test_no_maps_are_captured_where_none_are_asked_for(gl_context):
+    runtime = Runtime(colored_room(), context=gl_context)
+    config = TunedConfig(ArtistParameters(vpl_count=16), quality=Quality(map_size=4, rsm_resolution=64))
+    assert runtime.capture(VIEW, config.seen_by("transmittance")).visibility_maps is None
+    assert runtime.capture(VIEW, config, maps=False).visibility_maps is None
+    assert runtime.capture(VIEW, config).visibility_maps is not None

@@ -5,10 +5,11 @@ import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, quad, scene_of
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import read_image
-from vpltune.renderer.frame.frame import frame_light_records
 from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.scene.scene import Camera, Light, Scene, Texture, look_at
 from vpltune.renderer.scene.views import View
 from vpltune.renderer.techniques.gather_full_rsm import GatherFullRsm
@@ -16,17 +17,8 @@ from vpltune.renderer.techniques.ray_traced_instant_radiosity import RayTracedIn
 from vpltune.renderer.techniques.screen_space_only import ScreenSpaceOnly
 from vpltune.renderer.techniques.vpls_readback import VplsReadback
 
-pytestmark = pytest.mark.usefixtures("current_context")
-
 PARAMETERS = ArtistParameters(vpl_count=1024, falloff_footprint=0.5)
 ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.15, 0.45))
-
-
-@pytest.fixture
-def current_context(gl_context):
-    """The comparison modes draw in whichever context is current; a runtime makes its own so."""
-    with gl_context:
-        yield
 
 
 class Drawn:
@@ -34,21 +26,21 @@ class Drawn:
 
     def __init__(self, context, scene: Scene, view: View, rsm_resolution: int = 256):
         self.scene, self.view = scene, view
-        self._runtime = Runtime(
-            scene, TunedConfig(PARAMETERS, visibility="none"), context=context, rsm_resolution=rsm_resolution
+        self._config = TunedConfig(
+            PARAMETERS, visibility="transmittance", quality=Quality(rsm_resolution=rsm_resolution)
         )
-        self.records = frame_light_records(
-            self._runtime.scene_buffers, view, self._runtime._snapped_cells(view)
-        )
-        self.frame = self._runtime._draw(view)
+        self._runtime = Runtime(scene, context=context)
+        drawn = self._runtime.draw(view, self._config)
+        self.frame, self.inputs = drawn.frame, drawn.inputs
 
     def main_path(self) -> np.ndarray:
         """The mean image over four rotations of the point table."""
-        images = []
-        for rotation in ROTATIONS:
-            frame = self._runtime._draw(self.view, rotation)
-            images.append(read_image(frame.vpl_irradiance)[..., :3])
-        return np.mean(images, axis=0)
+        frames = self._runtime.captures(self.view, self._config, ROTATIONS)
+        return np.mean([frame.vpl_irradiance for frame in frames], axis=0)
+
+
+def irradiance(resources: Resources) -> np.ndarray:
+    return read_image(resources, "vpl_irradiance")[..., :3]
 
 
 def inside_room(light: str, size=(32, 24)) -> View:
@@ -66,8 +58,8 @@ def test_the_full_rsm_has_the_same_energy(gl_context, light):
     """
     drawn = Drawn(gl_context, colored_room(), inside_room(light))
     expected = drawn.main_path().mean()
-    image = read_image(GatherFullRsm(gl_context, drawn.frame, stride=2).draw(drawn.view, PARAMETERS))
-    assert image[..., :3].mean() == pytest.approx(expected, rel=0.02)
+    image = irradiance(GatherFullRsm(drawn.frame, stride=2).draw(drawn.inputs))
+    assert image.mean() == pytest.approx(expected, rel=0.02)
 
 
 def test_the_stride_changes_no_energy(gl_context):
@@ -75,8 +67,7 @@ def test_the_stride_changes_no_energy(gl_context):
     drawn = Drawn(gl_context, colored_room(), inside_room("spot", (16, 12)), rsm_resolution=128)
     means = []
     for stride in (1, 4):
-        full = GatherFullRsm(gl_context, drawn.frame, stride)
-        means.append(read_image(full.draw(drawn.view, PARAMETERS))[..., :3].mean())
+        means.append(irradiance(GatherFullRsm(drawn.frame, stride).draw(drawn.inputs)).mean())
     assert means[0] == pytest.approx(means[1], rel=0.02)
 
 
@@ -85,9 +76,10 @@ def test_read_back_vpls_have_the_same_energy(gl_context, light):
     """Within 5 %: of 2,048 Poisson-disc points many fall on dark texels, and few carry the light."""
     drawn = Drawn(gl_context, colored_room(), inside_room(light))
     expected = drawn.main_path()
-    readback = VplsReadback(gl_context, drawn.frame, 2048)
-    image = read_image(readback.draw(drawn.view, readback.place(readback.read(), drawn.records), PARAMETERS))
-    np.testing.assert_allclose(image[..., :3].mean(axis=(0, 1)), expected.mean(axis=(0, 1)), rtol=0.05)
+    readback = VplsReadback(drawn.frame, 2048)
+    vpls = readback.place(readback.read(), drawn.inputs.records)
+    image = irradiance(readback.draw(drawn.inputs, vpls))
+    np.testing.assert_allclose(image.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), rtol=0.05)
 
 
 def test_read_back_texels_are_the_gpus(gl_context):
@@ -96,9 +88,9 @@ def test_read_back_texels_are_the_gpus(gl_context):
     Within 2 %, what 2,048 uniform points leave uncertain of a spot's footprint.
     """
     drawn = Drawn(gl_context, colored_room(), inside_room("spot"))
-    vpls = np.frombuffer(drawn.frame.virtual_point_lights.virtual_point_lights.read(), np.float32)
-    readback = VplsReadback(gl_context, drawn.frame, 2048)
-    placed = readback.place(readback.read(), drawn.records)
+    vpls = np.frombuffer(drawn.frame.resources.read("virtual_point_lights"), np.float32)
+    readback = VplsReadback(drawn.frame, 2048)
+    placed = readback.place(readback.read(), drawn.inputs.records)
     np.testing.assert_allclose(
         placed["flux"].sum(axis=0), vpls.reshape(-1, 12)[:, 8:11].sum(axis=0), rtol=0.02
     )
@@ -109,8 +101,8 @@ def test_traced_rays_have_the_same_energy(gl_context, light):
     """Within 5 %: rays are uniform over the light's whole cone or beam, and many miss the room."""
     drawn = Drawn(gl_context, colored_room(), inside_room(light))
     expected = drawn.main_path()
-    traced = RayTracedInstantRadiosity(gl_context, drawn.frame, drawn.scene, 2048)
-    image = read_image(traced.draw(drawn.view, PARAMETERS))[..., :3]
+    traced = RayTracedInstantRadiosity(drawn.frame, drawn.scene, 2048)
+    image = irradiance(traced.draw(drawn.view, drawn.inputs))
     np.testing.assert_allclose(image.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), rtol=0.05)
 
 
@@ -142,8 +134,7 @@ def test_the_screen_holds_all_light_where_all_is_seen(gl_context):
     view = View("corner", "fitted", (96, 72), camera, (light,))
     drawn = Drawn(gl_context, scene_of([floor, wall], [(0.6, 0.6, 0.6)]), view)
     expected = drawn.main_path()
-    screen = ScreenSpaceOnly(gl_context, drawn.frame, stride=1)
-    image = read_image(screen.draw(view, PARAMETERS))[..., :3]
+    image = irradiance(ScreenSpaceOnly(drawn.frame, stride=1).draw(drawn.inputs))
     assert image.mean() == pytest.approx(expected.mean(), rel=0.03)
 
 
@@ -158,5 +149,23 @@ def test_the_screen_knows_nothing_of_what_it_does_not_see(gl_context):
     )
     drawn = Drawn(gl_context, colored_room(), view)
     assert drawn.main_path().mean() > 0.0
-    image = read_image(ScreenSpaceOnly(gl_context, drawn.frame).draw(view, PARAMETERS))
-    assert not image[..., :3].any()
+    assert not irradiance(ScreenSpaceOnly(drawn.frame).draw(drawn.inputs)).any()
+
+
+def test_a_technique_leaves_the_frame_as_it_is(gl_context):
+    """VPLs, parameters and irradiance of its own lie beside the frame's."""
+    drawn = Drawn(gl_context, colored_room(), inside_room("spot", (16, 12)), rsm_resolution=64)
+    names = ("virtual_point_lights", "artist_parameters")
+    before = [drawn.frame.resources.read(name) for name in names]
+    image = irradiance(drawn.frame.resources)
+    readback = VplsReadback(drawn.frame, 64)
+    for resources in (
+        GatherFullRsm(drawn.frame, stride=4).draw(drawn.inputs),
+        ScreenSpaceOnly(drawn.frame).draw(drawn.inputs),
+        RayTracedInstantRadiosity(drawn.frame, drawn.scene, 64).draw(drawn.view, drawn.inputs),
+        readback.draw(drawn.inputs, readback.place(readback.read(), drawn.inputs.records)),
+    ):
+        assert irradiance(resources).any()
+        assert not np.array_equal(irradiance(resources), image)
+    np.testing.assert_array_equal(irradiance(drawn.frame.resources), image)
+    assert [drawn.frame.resources.read(name) for name in names] == before

@@ -31,11 +31,13 @@ def make_job(tmp_path):
 
 @pytest.fixture
 def fits(monkeypatch):
-    """Replaces `fit_scene`: `scenes` lists what was fitted; `error`, `status` and `files` set the result."""
-    log = SimpleNamespace(scenes=[], error=None, status="improved", files={"tuned.json": "{}"})
+    """Replaces `fit_scene`: `scenes` and `starts` list what was fitted; `error`, `status` and `files` set the
+    result."""
+    log = SimpleNamespace(scenes=[], starts=[], error=None, status="improved", files={"tuned.json": "{}"})
 
     def fit_scene(scene_path, output, options, progress):
         log.scenes.append(scene_path.name)
+        log.starts.append(options.start)
         if log.error is not None:
             raise log.error
         output.mkdir(parents=True)

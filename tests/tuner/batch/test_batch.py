@@ -3,10 +3,12 @@
 import json
 import shutil
 import sys
+from dataclasses import replace
 
 import pandas
 import pytest
 
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, config_text
 from vpltune.renderer.errors import InputError
 from vpltune.tuner.batch.batch import run_batch
@@ -45,9 +47,9 @@ def library(tmp_path):
     return folder
 
 
-def run(library, watcher=None, scheduler=one_after_another, **arguments):
+def run(library, watcher=None, scheduler=one_after_another, options=OPTIONS, **arguments):
     watcher = watcher or Watcher()
-    result = run_batch(library, library.parent / "out", OPTIONS, scheduler, watcher, **arguments)
+    result = run_batch(library, library.parent / "out", options, scheduler, watcher, **arguments)
     return result, watcher
 
 
@@ -69,6 +71,16 @@ def test_a_changed_scene_is_done_again_and_the_listing_says_which_record_counts(
     assert len(Records(out).known_keys()) == 4
     listing = json.loads((out / "library.json").read_text())["scenes"]
     assert {record.key for record in result.records} == set(listing.values())
+
+
+def test_fits_start_with_the_quality_of_the_config_and_another_is_done_again(library, fits):
+    first = TunedConfig(quality=Quality(interleave=4, map_size=8, rsm_resolution=256))
+    second = replace(first, quality=replace(first.quality, map_size=16))
+    for start in (first, second):
+        options = JobOptions(start=config_text(start))
+        assert run(library, options=options)[0].fitted == 3
+        assert fits.starts[-3:] == [start] * 3
+        assert run(library, options=options)[0].fitted == 0
 
 
 def test_copies_are_done_once(library, fits):

@@ -201,7 +201,7 @@ def test_submitit_survives_the_end_of_all_its_tasks(library, tmp_path, monkeypat
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        ("partition", "must be KEY=VALUE parted by commas, got 'partition'"),
+        ("partition", "must be KEY=VALUE separated by commas, got 'partition'"),
         ("cluster=local,colour=red", "--slurm: Parameter 'colour' need to be prefixed"),
     ],
 )

@@ -8,26 +8,26 @@ from built_scenes import colored_room, room_view
 from own_reference import own_reference
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.scene import Camera, look_at
 from vpltune.tuner.evaluation.evidence import doubts, undetermined
 from vpltune.tuner.fitting.uncertainty import Interval
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
-FEW = ArtistParameters(vpl_count=16)
+FEW = TunedConfig(ArtistParameters(vpl_count=16), quality=Quality(rsm_resolution=128))
 
 
 @pytest.fixture(scope="module")
 def runtime(gl_context):
-    runtime = Runtime(colored_room(), "default", rsm_resolution=128, context=gl_context)
-    runtime.parameters = FEW
-    return runtime
+    return Runtime(colored_room(), context=gl_context)
 
 
 def seen(runtime, light="spot", camera=None, **reference) -> CapturedView:
     view = room_view(light)
     view = view if camera is None else replace(view, camera=camera)
-    captured = runtime.capture(view)
+    captured = runtime.capture(view, FEW)
     return CapturedView(view, replace(own_reference(captured), **reference), captured)
 
 
@@ -46,10 +46,9 @@ def test_views_without_light_are_too_few_to_judge_by(runtime, good):
     assert found == "indirect light reaches only 1 of 3 validation views"
 
 
-def test_a_handful_of_pixels_is_too_few(gl_context, good):
-    runtime = Runtime(colored_room(), "default", rsm_resolution=128, context=gl_context)
+def test_a_handful_of_pixels_is_too_few(runtime, good):
     view = room_view("spot", size=(2, 2))
-    captured = runtime.capture(view)
+    captured = runtime.capture(view, FEW.with_parameters(ArtistParameters()))
     small = CapturedView(view, own_reference(captured), captured)
     (found,) = doubts([good], [small, small])
     assert found == "the validation views have only 8 lit pixels; at least 256 are needed"

@@ -8,6 +8,8 @@ from built_scenes import colored_room
 from converged_views import converged_view
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, placement
+from vpltune.renderer.config.quality import Quality
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.evaluation.validation import between, candidates
 from vpltune.tuner.fitting.choose_placement import choose_placement, placement_name
@@ -15,36 +17,35 @@ from vpltune.tuner.fitting.fit_views import robust_errors
 from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
 
 START = ArtistParameters(vpl_count=64)
+CONFIG = TunedConfig(START, quality=Quality(rsm_resolution=128))
 
 
 @pytest.mark.slow
 def test_discs_beat_points_in_a_corner(gl_context):
     """Beside 16,384 VPLs as the truth: the chosen placement has less cost, and its views are drawn with
     it."""
-    runtime = Runtime(colored_room(), "default", rsm_resolution=128, context=gl_context)
-    truth = [converged_view(runtime, light) for light in ("spot", "point", "wide_spot")]
-    runtime.parameters = START
-    views = capture_views(runtime, tuple(v.view for v in truth), tuple(v.reference for v in truth))
-    chosen = choose_placement(runtime, views, START, robust_errors(views))
+    runtime = Runtime(colored_room(), context=gl_context)
+    truth = [converged_view(runtime, light, CONFIG) for light in ("spot", "point", "wide_spot")]
+    views = capture_views(runtime, CONFIG, tuple(v.view for v in truth), tuple(v.reference for v in truth))
+    chosen = choose_placement(runtime, views, CONFIG, robust_errors(views))
     assert set(chosen.costs) == {"points γ=1 η=0", "discs λ=2 γ=1 η=0.5", "discs λ=2 γ=1 η=1"}
     assert chosen.costs[placement_name(chosen.parameters)] == min(chosen.costs.values()) < 1.0
     assert [view.view for view in chosen.views] == [view.view for view in views]
-    assert all(view.drawn_with == chosen.parameters for view in chosen.views)
+    assert all(view.drawn_with == CONFIG.with_parameters(chosen.parameters) for view in chosen.views)
 
 
 def test_a_start_that_is_best_keeps_its_views(gl_context):
     """Its own images are the reference: nothing is better."""
-    runtime = Runtime(colored_room(), "default", rsm_resolution=128, context=gl_context)
-    view = converged_view(runtime, "spot")
-    runtime.parameters = START
-    (drawn,) = capture_views(runtime, (view.view,), (view.reference,))
+    runtime = Runtime(colored_room(), context=gl_context)
+    view = converged_view(runtime, "spot", CONFIG)
+    (drawn,) = capture_views(runtime, CONFIG, (view.view,), (view.reference,))
     perfect = replace(
         view.reference,
         irradiance_a=drawn.captured.indirect_irradiance,
         irradiance_b=drawn.captured.indirect_irradiance,
     )
-    own = CapturedView(view.view, perfect, drawn.captured, START)
-    chosen = choose_placement(runtime, (own,), START, robust_errors((own,)))
+    own = CapturedView(view.view, perfect, drawn.captured, CONFIG)
+    chosen = choose_placement(runtime, (own,), CONFIG, robust_errors((own,)))
     assert chosen.parameters == START
     assert chosen.views == (own,)
 

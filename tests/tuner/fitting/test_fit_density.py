@@ -1,10 +1,14 @@
 """Density and falloff fitted to the error of few VPLs, on rotations of the point table."""
 
+from dataclasses import replace
+
 import pytest
 from built_scenes import colored_room
 from converged_views import MANY, converged_view
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.fitting.fit_density import (
     fit_density,
@@ -15,13 +19,13 @@ from vpltune.tuner.fitting.fit_density import (
 from vpltune.tuner.fitting.fit_status import FitStatus
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
-FEW = ArtistParameters(vpl_count=24)
+FEW = TunedConfig(ArtistParameters(vpl_count=24), quality=Quality(rsm_resolution=128))
 
 
 @pytest.fixture(scope="module")
 def room(gl_context) -> tuple[Runtime, CapturedView]:
-    runtime = Runtime(colored_room(), "default", rsm_resolution=128, context=gl_context)
-    return runtime, converged_view(runtime, "spot")
+    runtime = Runtime(colored_room(), context=gl_context)
+    return runtime, converged_view(runtime, "spot", FEW)
 
 
 @pytest.mark.slow
@@ -32,12 +36,13 @@ def test_few_vpls_are_better_where_they_were_not_fitted_to(room):
     rotations = table_rotations(16, 0, held_out=True)
 
     def error(parameters: ArtistParameters) -> float:
-        return float(rotation_errors(runtime, (view,), parameters, rotations).mean())
+        config = FEW.with_parameters(parameters)
+        return float(rotation_errors(runtime, (view,), config, rotations).mean())
 
     tuned = error(fit.parameters)
-    assert tuned < 0.33 * error(FEW)
+    assert tuned < 0.33 * error(FEW.parameters)
     assert tuned < 0.4 * error(ArtistParameters(vpl_count=48, density_exponent=0.0))
-    assert fit.parameters.vpl_count == FEW.vpl_count
+    assert fit.parameters.vpl_count == FEW.parameters.vpl_count
     assert fit.descent.loss == min(trial.loss for trial in fit.trials)
 
 
@@ -46,22 +51,22 @@ def test_the_result_is_never_worse_than_the_start(room):
     """The start's own density is among the trials, whatever it is."""
     runtime, view = room
     start = ArtistParameters(vpl_count=16, density_exponent=0.8, density_importance=0.3)
-    fit = fit_density(runtime, (view,), start, rotations=table_rotations(2, 0))
+    fit = fit_density(runtime, (view,), FEW.with_parameters(start), rotations=table_rotations(2, 0))
     own = [t for t in fit.trials if (t.density_exponent, t.density_importance) == (0.8, 0.3)]
     assert len(own) == 1
     assert fit.descent.loss <= own[0].loss
 
 
 def test_nothing_lit_is_a_status(gl_context):
-    runtime = Runtime(colored_room(), "default", rsm_resolution=64, context=gl_context)
-    view = converged_view(runtime, "spot")
-    away = Runtime(colored_room(), "default", rsm_resolution=64, context=gl_context)
+    runtime = Runtime(colored_room(), context=gl_context)
+    coarse = replace(FEW, quality=Quality(rsm_resolution=64))
+    view = converged_view(runtime, "spot", coarse)
     dark = CapturedView(
         type(view.view)("dark", "fitted", view.view.size, view.view.camera, ()), view.reference, view.captured
     )
-    fit = fit_density(away, (dark,), FEW, rotations=((0.0, 0.0),))
+    fit = fit_density(runtime, (dark,), coarse, rotations=((0.0, 0.0),))
     assert fit.descent.status is FitStatus.NOTHING_LIT
-    assert fit.parameters == FEW
+    assert fit.parameters == FEW.parameters
     assert len(fit.trials) == 1
 
 
@@ -90,4 +95,5 @@ def test_error_is_of_the_rotated_image(room):
     errors = rotation_errors(runtime, (view,), FEW, table_rotations(3, 0))
     assert errors.shape == (1, 3)
     assert len(set(errors.ravel())) == 3
-    assert rotation_errors(runtime, (view,), MANY, ((0.0, 0.0),)).item() == pytest.approx(0.0, abs=1e-9)
+    many = FEW.with_parameters(MANY)
+    assert rotation_errors(runtime, (view,), many, ((0.0, 0.0),)).item() == pytest.approx(0.0, abs=1e-9)

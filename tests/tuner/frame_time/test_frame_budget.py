@@ -1,52 +1,35 @@
 """Frames fitted into a time. The clock is a formula here: the machine's mood is not what is tested."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from built_scenes import colored_room
 from converged_views import converged_view
+from steady_clock import pass_times, steady_clock
 
-from vpltune.cli.budget_flags import budget_from_flags, render_flags, with_vpl_count
+from vpltune.cli.budget_flags import budget_from_flags, with_vpl_count
+from vpltune.cli.fit import _report
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import MetBudget, Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, read_config
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene
+from vpltune.tuner.fitting.fit_density import rotation_errors, table_rotations
 from vpltune.tuner.frame_time import cost_model, frame_budget, pareto_front
-from vpltune.tuner.frame_time.cost_model import CostModel, FrameChoice, PassCost, measured_cost_model
+from vpltune.tuner.frame_time.cost_model import CostModel, PassCost, measured_cost_model
 from vpltune.tuner.frame_time.fit_budget import BudgetOptions, fit_to_budget
 from vpltune.tuner.frame_time.frame_budget import FrameBudget
 
-START = TunedConfig(ArtistParameters(), visibility="none")
-
-
-def pass_times(runtime: Runtime) -> dict[str, float]:
-    """Of a machine that draws 0.05 ms a VPL, less where pixels share them out."""
-    count, interleave = runtime.parameters.vpl_count, runtime.options.interleave
-    resolution = runtime._rsm_resolution or 1024
-    passes = {
-        "reflective_shadow_map": 4.0 * (resolution / 1024) ** 2,
-        "virtual_point_lights": 6.0 * (resolution / 1024) ** 2 + 0.001 * count,
-        "vpl_gather": 1.0 + 0.05 * count / interleave**2,
-        "tone_mapping": 0.5,
-    }
-    if interleave > 1:
-        passes["interleaved_filter"] = 2.0
-    return passes
+START = TunedConfig(visibility="transmittance")
 
 
 @pytest.fixture
-def steady_clock(monkeypatch, tmp_path):
-    """Frames take 8 % longer than their passes, and none twice the same."""
-    noise = np.random.default_rng(0)
-
-    def frame(self, view, frames=5, lights=None):
-        return 1.08 * sum(pass_times(self).values()) * (1.0 + 0.01 * noise.standard_normal())
-
-    monkeypatch.setattr(Runtime, "pass_milliseconds", lambda self, view, frames=5: pass_times(self))
-    monkeypatch.setattr(Runtime, "frame_milliseconds", frame)
+def steady(monkeypatch, tmp_path):
+    """A clock that is a formula, fewer rotations, and no costs kept from before."""
+    steady_clock(monkeypatch)
     monkeypatch.setattr(frame_budget, "HELD_OUT_ROTATIONS", 2)
     monkeypatch.setattr(frame_budget, "ROTATIONS", 2)
     monkeypatch.setattr("vpltune.tuner.fitting.fit_density._EXPONENTS", ())
@@ -55,41 +38,47 @@ def steady_clock(monkeypatch, tmp_path):
 
 @pytest.fixture(scope="module")
 def prepared(gl_context) -> PreparedScene:
-    runtime = Runtime(colored_room(), START, rsm_resolution=128, context=gl_context)
-    return PreparedScene(colored_room(), runtime, (converged_view(runtime, "spot"),), (), ())
+    runtime = Runtime(colored_room(), context=gl_context)
+    coarse = replace(START, quality=Quality(rsm_resolution=128))
+    return PreparedScene(colored_room(), runtime, (converged_view(runtime, "spot", coarse),), (), ())
 
 
 @pytest.mark.parametrize("budget", [12.0, pytest.param(30.0, marks=pytest.mark.slow)])
-def test_the_frame_fits_the_budget(steady_clock, prepared, budget):
+def test_the_frame_fits_the_budget(steady, prepared, budget):
     """Within 10 % below and never more than 5 % above, although the model is 8 % off."""
     fit = FrameBudget(prepared, START, (24, 18)).fit(budget)
     assert 0.9 * budget <= fit.frame.milliseconds <= 1.05 * budget
-    runtime = fit.runtime
-    runtime.parameters = fit.parameters
-    assert 0.88 * budget <= runtime.frame_milliseconds(prepared.views[0].view) <= 1.07 * budget
+    config = fit.config(START)
+    again = prepared.runtime.frame_milliseconds(prepared.views[0].view, config)
+    assert 0.88 * budget <= again <= 1.07 * budget
+    assert config.quality.budget == MetBudget(budget, (24, 18), prepared.runtime.opengl_renderer)
+    assert replace(config.quality, budget=None) == fit.frame.choice
+    rotations = table_rotations(2, 0, held_out=True)
+    errors = rotation_errors(prepared.runtime, prepared.views, config, rotations)
+    assert float(errors.mean()) == fit.relmse, "the config draws what was measured"
     assert fit.parameters.vpl_count == fit.frame.vpl_count
     assert fit.document()["budget_milliseconds"] == budget
 
 
-def test_a_budget_below_the_cheapest_frame_is_refused(steady_clock, prepared):
+def test_a_budget_below_the_cheapest_frame_is_refused(steady, prepared):
     with pytest.raises(InputError, match=r"--budget-ms: must be at least .* got 0.5"):
         FrameBudget(prepared, START, (24, 18)).fit(0.5)
 
 
-def test_no_frame_settles_on_fewer_vpls_than_a_budget_must_have(steady_clock, prepared):
+def test_no_frame_settles_on_fewer_vpls_than_a_budget_must_have(steady, prepared):
     """2.35 ms would do for one VPL; four take 2.51, and that is the least that is asked of a budget."""
     budget = FrameBudget(prepared, START, (24, 18))
-    choice = FrameChoice(1, FrameChoice.visibility_map_size, 256)
+    choice = Quality(rsm_resolution=256)
     assert budget._settle(choice, 2.65).vpl_count >= frame_budget.LEAST_COUNT
     with pytest.raises(InputError, match=r"no frame could be measured within 2\.3 ms; the fastest took 2\."):
         budget._settle(choice, 2.3)
 
 
 @pytest.mark.slow
-def test_the_front_is_monotone_and_written(steady_clock, prepared, tmp_path, monkeypatch):
+def test_the_front_is_monotone_and_written(steady, prepared, tmp_path, monkeypatch):
     """More time, less error; each point's config reads back, and table and plot are there."""
     monkeypatch.setattr(pareto_front, "POINTS", 3)
-    parameters, _, found = fit_to_budget(
+    met, _, found = fit_to_budget(
         prepared, START, BudgetOptions(None, pareto=True, frame_size=(24, 18)), tmp_path
     )
     points = found["pareto"]
@@ -101,42 +90,46 @@ def test_the_front_is_monotone_and_written(steady_clock, prepared, tmp_path, mon
     for point in points:
         config = read_config(tmp_path / point["config"])
         assert config.parameters.as_dict() == point["parameters"]
-        assert config.provenance["interleave"] == point["choice"]["interleave"]
-    assert parameters.as_dict() == points[-1]["parameters"]
+        assert set(point["choice"]) == {"interleave", "map_size", "rsm_resolution"}
+        assert config.quality == replace(met.quality, **point["choice"], budget=config.quality.budget)
+    assert met.parameters.as_dict() == points[-1]["parameters"]
+    assert met.quality == read_config(tmp_path / points[-1]["config"]).quality
     assert len((tmp_path / "pareto.csv").read_text().splitlines()) == len(points) + 1
     assert (tmp_path / "pareto.png").read_bytes()[:4] == b"\x89PNG"
     json.dumps(found, allow_nan=False)
 
 
-def test_the_model_is_the_clock_and_is_kept(steady_clock, prepared, monkeypatch):
+def test_the_model_is_the_clock_and_is_kept(steady, prepared, monkeypatch):
     """Lines through two counts give a linear clock back exactly, and a second call measures nothing."""
-    view = prepared.views[0].view
-    context = prepared.runtime.context
-    model = measured_cost_model(prepared.scene, (view,), START, context)
-    for choice in (FrameChoice(1, 16, 1024), FrameChoice(4, 16, 512), FrameChoice(2, 16, 256)):
-        runtime = choice.runtime(prepared.scene, START, context)
+    view, runtime = prepared.views[0].view, prepared.runtime
+    model = measured_cost_model(prepared.scene, (view,), START, runtime)
+    for choice in (
+        Quality(1, 16, rsm_resolution=1024),
+        Quality(4, 16, rsm_resolution=512),
+        Quality(2, 16, rsm_resolution=256),
+    ):
         for count in (16, 100, 3000):
-            runtime.parameters = ArtistParameters(vpl_count=count)
-            assert model.milliseconds(choice, count) == pytest.approx(sum(pass_times(runtime).values()))
+            drawn = replace(START, parameters=ArtistParameters(vpl_count=count), quality=choice)
+            assert model.milliseconds(choice, count) == pytest.approx(sum(pass_times(drawn).values()))
             assert model.count_within(choice, model.milliseconds(choice, count)) == pytest.approx(count)
     monkeypatch.setattr(cost_model, "_measure", None)
-    assert measured_cost_model(prepared.scene, (view,), START, context) == model
+    assert measured_cost_model(prepared.scene, (view,), START, runtime) == model
 
 
-def test_damaged_costs_are_measured_anew(steady_clock, prepared):
-    view, context = prepared.views[0].view, prepared.runtime.context
-    model = measured_cost_model(prepared.scene, (view,), START, context)
+def test_damaged_costs_are_measured_anew(steady, prepared):
+    view, runtime = prepared.views[0].view, prepared.runtime
+    model = measured_cost_model(prepared.scene, (view,), START, runtime)
     (kept,) = (cost_model.cache_folder() / "costs").iterdir()
     Path(kept).write_text('{"interleave": 3}')
-    assert measured_cost_model(prepared.scene, (view,), START, context) == model
+    assert measured_cost_model(prepared.scene, (view,), START, runtime) == model
 
 
 def test_smaller_maps_scale_the_gather():
     costs = {1: {"vpl_gather": PassCost(1.0, 0.4)}}
     maps = {8: {"vpl_gather": PassCost(1.0, 0.3)}, 16: {"vpl_gather": PassCost(1.0, 0.4)}}
     model = CostModel(costs, maps, {1024: {}})
-    assert model.per_vpl(FrameChoice(1, 8, 1024)) == pytest.approx(0.3)
-    assert model.per_vpl(FrameChoice(1, 16, 1024)) == pytest.approx(0.4)
+    assert model.per_vpl(Quality(1, 8, rsm_resolution=1024)) == pytest.approx(0.3)
+    assert model.per_vpl(Quality(1, 16, rsm_resolution=1024)) == pytest.approx(0.4)
 
 
 def test_flags():
@@ -156,10 +149,23 @@ def test_flags():
 
 
 def test_the_next_command_draws_as_the_budget_did():
-    """Or, where only a front was asked for, as its last point, whose config is tuned.json."""
-    choice = {"interleave": 4, "visibility_map_size": 8, "rsm_resolution": 256}
-    fit = {"choice": choice, "frame_size": [64, 48]}
-    for document in ({"budget": fit}, {"pareto": [{}, fit]}, {"budget": fit, "pareto": [{}]}):
-        flags = render_flags(document)
-        assert flags == ["--interleave=4", "--map-size=8", "--rsm-resolution=256", "--size=64x48"]
-    assert render_flags({}) == render_flags({"pareto": []}) == []
+    """The config says how; only the size of the frames that were timed is a flag."""
+    quality = Quality(4, 8, rsm_resolution=256)
+    budget = MetBudget(3.0, (64, 48), "planted")
+    for drawn, size in ((replace(quality, budget=budget), " --size 64x48"), (quality, ""), (Quality(), "")):
+        assert f"--config out/tuned.json -o out/tuned.png{size}\n" in shown_after(drawn) + "\n"
+
+
+def shown_after(quality: Quality) -> str:
+    """The lines that a fit ends with, whose config has this quality."""
+    document = {
+        "scene": "room.glb",
+        "parameters": ArtistParameters().as_dict(),
+        "quality": quality.as_dict(),
+        "uncertainty": {},
+        "metrics": {},
+        "status": "improved",
+        "sentence": "better than the start",
+        "seconds": {"total": 1.0},
+    }
+    return "\n".join(line for line in _report(document, Path("out")).shown if isinstance(line, str))

@@ -1,5 +1,6 @@
 """The front of error against time, from fits and times that are planted: nothing is drawn."""
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -8,20 +9,15 @@ import pytest
 
 from vpltune.cli.budget_flags import budget_lines
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import MetBudget, Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, read_config
 from vpltune.renderer.errors import InputError
-from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.fitting.fit_status import Descent, FitStatus
 from vpltune.tuner.frame_time import pareto_front as front
-from vpltune.tuner.frame_time.cost_model import CostModel, FrameChoice, PassCost
+from vpltune.tuner.frame_time.cost_model import CostModel, PassCost
 from vpltune.tuner.frame_time.fit_budget import write_front
 from vpltune.tuner.frame_time.frame_budget import BudgetFit, FrameBudget, SettledFrame
 from vpltune.tuner.frame_time.pareto_front import fit_front
-
-
-class UndrawnRuntime(Runtime):
-    def __init__(self, choice):
-        self.choice = choice
 
 
 class PlantedBudget(FrameBudget):
@@ -31,7 +27,7 @@ class PlantedBudget(FrameBudget):
         self.errors, self.refused, self.interrupted_at = dict(errors), refused, interrupted_at
         self.fitted: list[float] = []
         self.timed: list[int] = []
-        self.default_choice = FrameChoice()
+        self.default_choice = Quality(rsm_resolution=1024)
         gather = {"vpl_gather": PassCost(1.0, 0.01)}
         self.costs = CostModel({1: gather}, {}, {self.default_choice.rsm_resolution: {}})
 
@@ -40,9 +36,6 @@ class PlantedBudget(FrameBudget):
 
     def content_key(self):
         return "planted"
-
-    def runtime(self, choice):
-        return UndrawnRuntime(choice)
 
     def fit(self, budget, progress=None):
         if len(self.fitted) == self.interrupted_at:
@@ -59,10 +52,11 @@ class PlantedBudget(FrameBudget):
             ArtistParameters(vpl_count=count, intensity=1.0 + 1e-4 * count),
             Descent(np.zeros(3, np.float32), 0.25, 0.5, np.array([0.5, 0.25]), FitStatus.CONVERGED),
             self.errors.get(len(self.fitted) - 1, 1.0 / count),
-            self.runtime(self.default_choice),
+            (64, 48),
+            "planted",
         )
 
-    def milliseconds(self, runtime, parameters, frames=7):
+    def milliseconds(self, choice, parameters, frames=7):
         self.timed.append(parameters.vpl_count)
         return 1.0 + 0.01 * parameters.vpl_count
 
@@ -105,7 +99,7 @@ def test_a_front_is_made_of_the_times_that_were_measured_beside_each_other():
     counts = budget.timed[: front.POINTS]
     assert budget.timed == counts * front.TURNS, "timed in turns"
     slow = PlantedBudget()
-    slow.milliseconds = lambda runtime, parameters, frames: (
+    slow.milliseconds = lambda choice, parameters, frames: (
         (1.0 + 0.01 * parameters.vpl_count) * (9.0 if parameters.vpl_count == counts[1] else 1.0)
     )
     points = fit_front(slow)
@@ -129,7 +123,7 @@ def test_an_interrupted_front_goes_on_where_it_was(tmp_path):
     for point, same in zip(points, whole, strict=True):
         assert (point.frame, point.parameters, point.relmse) == (same.frame, same.parameters, same.relmse)
         assert (point.descent.loss, point.descent.status) == (same.descent.loss, same.descent.status)
-        assert point.runtime.choice == same.frame.choice
+        assert (point.frame_size, point.machine) == (same.frame_size, same.machine)
     assert shares == sorted(shares)
     assert (shares[0], shares[-1]) == (0.0, pytest.approx(1.0 - 0.5 / front.POINTS))
     assert kept_files(tmp_path) == [], "one that is done is measured anew"
@@ -164,10 +158,12 @@ def test_a_front_that_is_written_replaces_the_one_before(tmp_path):
     for path, point, row in zip(written, points, rows, strict=False):
         config = read_config(path)
         assert config.parameters == point.parameters
+        met = MetBudget(point.budget, (64, 48), "planted")
+        assert config.quality == replace(point.frame.choice, budget=met)
         assert config.provenance["milliseconds"] == point.frame.milliseconds
         assert row["frame_size"] == [64, 48]
     head, *lines = (tmp_path / "pareto.csv").read_text().splitlines()
-    assert head == "milliseconds,relmse,vpl_count,interleave,visibility_map_size,rsm_resolution,config"
+    assert head == "milliseconds,relmse,vpl_count,interleave,map_size,rsm_resolution,config"
     assert [line.split(",")[-1] for line in lines] == ["pareto/0.json", "pareto/1.json"]
     assert len({line.count(",") for line in (head, *lines)}) == 1
     assert (tmp_path / "pareto.png").read_bytes()[:4] == b"\x89PNG"

@@ -78,16 +78,16 @@ def test_pixels_that_no_parameter_can_mend_do_not_rule_a_fit(gl_context):
     half of that. It does not reach 0: a black pixel has a hundred times the weight of others and still pulls
     ten times as hard.
     """
-    runtime = Runtime(colored_room(), TunedConfig(PLANTED, visibility="transmittance"), context=gl_context)
+    runtime = Runtime(colored_room(), context=gl_context)
+    planted = TunedConfig(PLANTED, visibility="transmittance")
     view = room_view("spot")
-    captured = runtime.capture(view)
+    captured = runtime.capture(view, planted)
     reference = own_reference(captured)
     spoilt = reference.irradiance_a.copy()
     spoilt[np.random.default_rng(2).random(spoilt.shape[:2]) < 0.02] = 0.0
     reference = replace(reference, irradiance_a=spoilt, irradiance_b=spoilt)
     start = ArtistParameters(vpl_count=256)
-    runtime.parameters = start
-    drawn = CapturedView(view, reference, runtime.capture(view))
+    drawn = CapturedView(view, reference, runtime.capture(view, planted.with_parameters(start)))
     held = frozenset({"extinction_coefficient"})
     plain = fit_placement((drawn,), start, held=held).parameters
     robust = fit_placement((drawn,), start, robust_errors((drawn,)), held=held).parameters

@@ -10,6 +10,7 @@ from built_scenes import colored_room, room_view
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
 from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.metrics.relative_squared_error import target_of, weighted_squared_error
@@ -40,10 +41,8 @@ def view(gl_context) -> CapturedView:
     """A room whose reference is the runtime's own image with other parameters, with noise in both halves."""
     gl_context.__enter__()
     truth = replace(PARAMETERS, intensity=1.4, falloff_footprint=1.0)
-    runtime = Runtime(
-        colored_room(), TunedConfig(truth, visibility="maps"), context=gl_context, rsm_resolution=128
-    )
-    drawn = runtime.capture(room_view())
+    config = TunedConfig(truth, visibility="maps", quality=Quality(rsm_resolution=128))
+    drawn = Runtime(colored_room(), context=gl_context).capture(room_view(), config)
     noise = np.random.default_rng(0).normal(1.0, 0.05, (2, *drawn.indirect_irradiance.shape))
     halves = (drawn.indirect_irradiance * noise).astype(np.float32)
     reference = ReferenceView(

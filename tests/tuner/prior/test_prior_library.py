@@ -8,6 +8,7 @@ import numpy as np
 from own_reference import own_reference
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import DEFAULT_OPTIONS, Runtime
 from vpltune.tuner.prior import prior_library
@@ -29,9 +30,14 @@ def test_what_the_runtime_does_otherwise_is_another_capture(monkeypatch):
     views = prior_library.prior_views(scene)
     before = prior_library._key(scene, views)
     assert prior_library._key(scene, views) == before
-    coarse = replace(DEFAULT_OPTIONS, visibility_map_refinement=1)
-    monkeypatch.setattr(prior_library, "DEFAULT_OPTIONS", coarse)
-    assert prior_library._key(scene, views) != before
+    keys = {before}
+    for quality in (Quality(map_refinement=1), Quality(map_size=8), Quality(interleave=2)):
+        with monkeypatch.context() as patch:
+            patch.setattr(prior_library, "CONFIG", replace(prior_library.CONFIG, quality=quality))
+            keys.add(prior_library._key(scene, views))
+    monkeypatch.setattr(prior_library, "DEFAULT_OPTIONS", replace(DEFAULT_OPTIONS, rsm_filtering=1))
+    keys.add(prior_library._key(scene, views))
+    assert len(keys) == 5
 
 
 def test_captures_are_those_of_their_version(gl_context, monkeypatch):
@@ -41,12 +47,9 @@ def test_captures_are_those_of_their_version(gl_context, monkeypatch):
     monkeypatch.setattr(prior_library, "ROTATIONS", {32: ((0.0, 0.0),)})
     scene = generated_scene(0)
     views = prior_library.prior_views(scene)[:1]
-    through_walls = Runtime(
-        scene, TunedConfig(ArtistParameters(), visibility="none"), context=gl_context, rsm_resolution=128
-    )
-    found = prior_library._captured(
-        gl_context, scene, views, (own_reference(through_walls.capture(views[0])),)
-    )
+    through_walls = TunedConfig(visibility="transmittance", quality=Quality(rsm_resolution=128))
+    drawn = Runtime(scene, context=gl_context).capture(views[0], through_walls)
+    found = prior_library._captured(gl_context, scene, views, (own_reference(drawn),))
     table = jax.tree.map(lambda values: jnp.asarray(values[0]), found.table)
     point = default_point(ArtistParameters())
     losses = [float(table_loss(table, point + move)) for move in MOVES]

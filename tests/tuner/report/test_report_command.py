@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from planted_metrics import change_metrics
+from planted_metrics import PLANTED, change_metrics
 
 from vpltune.__main__ import run
 from vpltune.renderer.errors import InputError
@@ -79,6 +79,37 @@ def test_a_fit_without_images_has_a_page_all_the_same(fit_copy):
     page = scene_page(read_fit_folder(fit_copy))
     assert "kept no images" in page
     assert "Against the path tracer" in page
+
+
+def as_version_0_1_0(value):
+    """A document with the names that version 0.1.0 wrote."""
+    older = {
+        "extinction_coefficient": "falloff_transmittance",
+        "lloyd_iterations": "density_relaxation",
+        "error_breakdown": "error_budget",
+        "map_size": "visibility_map_size",
+    }
+    if isinstance(value, dict):
+        return {older.get(key, key): as_version_0_1_0(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [older.get(each, each) if isinstance(each, str) else as_version_0_1_0(each) for each in value]
+    return value
+
+
+def test_a_folder_of_version_0_1_0_has_the_same_page(fit_copy):
+    """It wrote pictures.npz, called two parameters and the error's split otherwise, and had no quality."""
+    change_metrics(fit_copy, **PLANTED)
+    page = scene_page(read_fit_folder(fit_copy))
+    for words in ("extinction coefficient", "Lloyd iterations", "map size 16", "missing bounces"):
+        assert words.lower() in page.lower()
+    document = json.loads((fit_copy / "metrics.json").read_text(encoding="utf-8"))
+    del document["quality"]
+    older = as_version_0_1_0(document)
+    assert {"falloff_transmittance", "density_relaxation"} < set(older["parameters"])
+    assert older["budget"]["choice"]["visibility_map_size"] == 16
+    (fit_copy / "metrics.json").write_text(json.dumps(older), encoding="utf-8")
+    (fit_copy / "images.npz").rename(fit_copy / "pictures.npz")
+    assert scene_page(read_fit_folder(fit_copy)) == page
 
 
 @pytest.mark.slow

@@ -263,10 +263,15 @@ def test_parts_appear_where_the_fit_made_them(chromium, fit_copy):
         ):
             assert words in text
         assert "the prior" in text
-        for words in ("3.75 ms", "predicted 3.5 ms", "640×480", "interleave 4, visibility maps"):
+        for words in (
+            "3.75 ms",
+            "predicted 3.5 ms",
+            "640×480",
+            "interleave 4, map size 16, RSM resolution 512",
+        ):
             assert words in text
         assert shown.page.locator(".chart .named", has_text="budget 4 ms").count() == 1
-        assert "intensity, falloff transmittance" in text
+        assert "intensity, extinction coefficient" in text
         assert shown.page.locator(".range .interval").count() == 2
         described = shown.page.locator(".chart desc").all_text_contents()
         assert any("3 configs, from 1 ms at relMSE 0.5 to 8 ms at relMSE 0.1" in words for words in described)

@@ -31,8 +31,8 @@ from vpltune.renderer.scene.scene import Scene, Texture, transform_normals, tran
 from vpltune.renderer.scene.views import View, light_to_json
 
 FORMAT = "vpltune-bundle"
-VERSION = 1
-"""Version of the bundle that is written."""
+VERSION = 2
+"""Version of the bundle that is written. Since 2 its `config` is of version 2."""
 # What triangles without a texture look up.
 WHITE = Texture("white", np.full((1, 1, 3), 255, np.uint8))
 DOCUMENT_NAME, BINARY_NAME = "bundle.json", "bundle.bin"

@@ -1,7 +1,5 @@
 """The card of a learnt prior: training scenes, error on unseen scenes, and the scenes where it is worst."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from vpltune.renderer.config.artist_parameters import parameter_spec
@@ -9,10 +7,7 @@ from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS
 from vpltune.renderer.config.scene_statistics import STATISTIC_NAMES
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.tuner.prior.prior_library import FITTED, HELD_OUT, VIEW_SIZE
-from vpltune.tuner.prior.prior_training import FLOOR, FOLDS
-
-if TYPE_CHECKING:
-    from vpltune.tuner.prior.train_prior import LearntPrior
+from vpltune.tuner.prior.prior_training import FLOOR, FOLDS, LearntPrior
 
 WORST = 8
 """Number of scenes in the list of the worst. A choice."""

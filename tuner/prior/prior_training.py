@@ -20,7 +20,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
-from jaxtyping import Array, Bool, Float, Float32, Int32
+from jaxtyping import Array, Bool, Float, Float32, Float64, Int32
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.auto_prior import AutoPrior
@@ -88,6 +88,21 @@ class OwnFits:
     vpl_counts: tuple[int, ...]
     points: Float32[np.ndarray, "scenes counts parameters"]
     """Points in the unit cube."""
+
+
+@dataclass(frozen=True, eq=False)
+class LearntPrior:
+    """A prior trained on all scenes, and for each scene a prior trained without it."""
+
+    scenes: tuple[PriorScene, ...]
+    fits: OwnFits
+    prior: AutoPrior
+    """Trained on all scenes."""
+    unseen: tuple[AutoPrior, ...]
+    """For each scene, the prior of the fold that leaves it out."""
+    losses: dict[str, Float64[np.ndarray, "measures scenes counts splits"]]
+    """Mean losses of `auto` (the prior from `unseen`), `fit` (the scene's own fit) and `default`. The
+    measures are the robust loss of a fit and relMSE; the splits are fitted and held-out views."""
 
 
 def own_fits(scenes: tuple[PriorScene, ...], held_out: bool = False) -> OwnFits:

@@ -2,7 +2,7 @@
 
 import importlib.metadata
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from vpltune.tuner.prior.prior_card import prior_card
 from vpltune.tuner.prior.prior_library import PriorScene, prior_scene
 from vpltune.tuner.prior.prior_training import (
     FOLDS,
+    LearntPrior,
     OwnFits,
     TrainingRows,
     own_fits,
@@ -35,21 +36,6 @@ from vpltune.tuner.prior.prior_training import (
 )
 from vpltune.tuner.prior.scene_generator import generated_name, generated_scene
 from vpltune.tuner.surrogate.compiled_functions import keep_compiled_functions
-
-
-@dataclass(frozen=True, eq=False)
-class LearntPrior:
-    """A prior trained on all scenes, and for each scene a prior trained without it."""
-
-    scenes: tuple[PriorScene, ...]
-    fits: OwnFits
-    prior: AutoPrior
-    """Trained on all scenes."""
-    unseen: tuple[AutoPrior, ...]
-    """For each scene, the prior of the fold that leaves it out."""
-    losses: dict[str, Float64[np.ndarray, "measures scenes counts splits"]]
-    """Mean losses of `auto` (the prior from `unseen`), `fit` (the scene's own fit) and `default`. The
-    measures are the robust loss of a fit and relMSE; the splits are fitted and held-out views."""
 
 
 def learn_prior(scenes: tuple[PriorScene, ...], progress: Progress) -> LearntPrior:

@@ -88,7 +88,7 @@ class ParameterSpec:
         """`value_at`, clamped to the range: rounding may step over a bound, and readers are strict."""
         return float(min(max(self.value_at(place), self.low), self.high))
 
-    def place_of(self, value: float) -> float:
+    def place_of(self, value: float | int) -> float:
         """Where along the axis, in [0, 1], the parameter has `value`."""
         if self.scale == "log":
             return math.log(value / self.low) / math.log(self.high / self.low)

@@ -308,7 +308,7 @@ def test_a_checksum_is_renewed_only_where_it_is_written(config_path, tmp_path, c
     scene = ["--scene", str(SCENE)] if form in ("bundle", "web") else []
     arguments = ["export", str(config_path), "--to", form, "-o", str(tmp_path / "a.html"), *scene]
     assert run([*arguments, "--renew-checksum"]) == 2
-    told = f"vpltune: --renew-checksum: goes with --to json and gltf, got --to {form}\n"
+    told = f"vpltune: --renew-checksum: needs --to json or gltf, got --to {form}\n"
     assert capfd.readouterr().err == told
 
 

@@ -15,6 +15,7 @@ from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.placement import resolve_camera_and_lights
 from vpltune.renderer.scene.scene import Camera, Light, look_at
 from vpltune.renderer.scene.views import View
+from vpltune.tuner.surrogate.receiver_chunks import receivers_at_once
 from vpltune.tuner.surrogate.tabulated_gather import gather_tabulated, tabulate_gather
 from vpltune.tuner.surrogate.virtual_point_lights import gather_inputs
 from vpltune.tuner.surrogate.vpl_gather import (
@@ -22,7 +23,6 @@ from vpltune.tuner.surrogate.vpl_gather import (
     FalloffParameters,
     gather,
     gather_pairwise,
-    receivers_at_once,
 )
 
 PARAMETERS = (

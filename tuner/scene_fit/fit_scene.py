@@ -2,16 +2,13 @@
 
 import importlib.metadata
 import platform
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from statistics import fmean
 from typing import Any
 
 import numpy as np
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec, placement
-from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS
+from vpltune.renderer.config.artist_parameters import ArtistParameters, placement
 from vpltune.renderer.config.tuned_config import FitNote, TunedConfig, read_config, write_config
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
@@ -35,9 +32,9 @@ from vpltune.tuner.fitting.fit_density import table_rotations
 from vpltune.tuner.fitting.fit_status import Descent, FitStatus, Outcome
 from vpltune.tuner.fitting.search_space import SearchSpace
 from vpltune.tuner.frame_time.fit_budget import BudgetOptions
-from vpltune.tuner.metrics.view_metrics import ViewMetrics
 from vpltune.tuner.reference.content_key import scene_digest
 from vpltune.tuner.scene_fit.fit_search import Search, search
+from vpltune.tuner.scene_fit.prior_in_fit import auto_candidate, fit_start, prior_metrics
 from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
 
 VALIDATION_ROTATIONS = 4
@@ -282,7 +279,7 @@ def _validated(
 ) -> tuple[Verdict | None, tuple[str, ...]]:
     """The choice on the validation views, None with fewer than two lit ones, and the reasons not to judge by
     them."""
-    auto = _auto_candidate(prepared, start, options)
+    auto = auto_candidate(prepared, start, options.start)
     tried = candidates(start.parameters, found.base, found.tuned, auto)
     # The identity, which the runtime draws with, and rotations that the density was not fitted to.
     rotations = table_rotations(VALIDATION_ROTATIONS - 1, options.seed, held_out=True)
@@ -296,53 +293,13 @@ def _validated(
         progress=lambda share: progress("validate", share),
     )
     if options.start.auto is not None and options.budget is None:
-        metrics["start"] = _prior_metrics(prepared, options.start)
+        metrics["start"] = prior_metrics(prepared, options.start)
     fitted = [view for view in prepared.views if view.view.split == "fitted"]
     doubt = doubts(fitted, captured)
     if len(metrics["start"]) < 2:
         return None, doubt
     judged = {name: (parameters, metrics[name]) for name, parameters in tried.items()}
     return verdict(metrics["start"], judged), doubt
-
-
-def _prior_metrics(prepared: PreparedScene, start: TunedConfig) -> list[ViewMetrics]:
-    """Metrics of a start with a prior, which sets the parameters anew in each validation view."""
-    runtime = prepared.runtime
-    drawn = [
-        CapturedView(view, reference, runtime.capture(view, start, maps=False))
-        for view, reference in prepared.validation
-    ]
-    return [view.metrics(view.captured.indirect_irradiance) for view in drawn if view.lit]
-
-
-def _auto_candidate(
-    prepared: PreparedScene, start: TunedConfig, options: FitOptions
-) -> ArtistParameters | None:
-    """The parameters that the shipped prior sets for the start's placement: the mean over the fitted views.
-
-    None if the prior was not trained for this start, which has clustered disc lights or no visibility maps,
-    or if the start has a prior itself.
-    """
-    parameters = start.parameters
-    if (
-        parameters.lloyd_iterations > 0
-        or options.start.visibility != "maps"
-        or options.start.auto is not None
-    ):
-        return None
-    prior = read_config("auto").auto
-    statistics = [
-        view.statistics
-        for view in prepared.views
-        if view.view.split == "fitted"
-        and view.statistics is not None
-        and view.drawn_with is not None
-        and view.drawn_with.parameters == parameters
-    ]
-    if prior is None or not statistics:
-        return None
-    set_by_view = [prior.parameters(each.astype(np.float64), parameters) for each in statistics]
-    return _mean_parameters(parameters, set_by_view)
 
 
 def _evaluated(prepared: PreparedScene, found: _Found, options: FitOptions, progress: Progress) -> Evaluation:
@@ -380,25 +337,6 @@ def _same_vpls(first: TunedConfig, second: TunedConfig) -> bool:
         and first.visibility == second.visibility
         and replace(first.quality, interleave=1) == replace(second.quality, interleave=1)
     )
-
-
-def fit_start(config: TunedConfig, drawn: Sequence[ArtistParameters]) -> ArtistParameters:
-    """The parameters that a fit starts from: the config's, or the mean of those that its prior set.
-
-    Args:
-        config: the start.
-        drawn: parameters that the views were drawn with; at least one if the config has a prior.
-    """
-    return config.parameters if config.auto is None else _mean_parameters(config.parameters, drawn)
-
-
-def _mean_parameters(rest: ArtistParameters, drawn: Sequence[ArtistParameters]) -> ArtistParameters:
-    """Mean of the parameters that a prior sets, each on its own scale; all others are those of `rest`."""
-    values = {}
-    for name in AUTO_PARAMETERS:
-        spec = parameter_spec(name)
-        values[name] = spec.within(fmean(spec.place_of(getattr(each, name)) for each in drawn))
-    return replace(rest, **values)
 
 
 def default_like(start: ArtistParameters) -> ArtistParameters:

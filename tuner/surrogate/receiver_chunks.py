@@ -8,6 +8,11 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 
+def receivers_at_once(vpl_count: int, pairs: int) -> int:
+    """Receivers in a chunk of at most `pairs` pairs with all VPLs: a power of two, at least 1."""
+    return 2 ** max((pairs // max(vpl_count, 1)).bit_length() - 1, 0)
+
+
 def map_receivers(
     of_chunk: Callable[..., Array],
     arrays: tuple[Any, ...],
@@ -20,14 +25,13 @@ def map_receivers(
         of_chunk: takes a chunk of each of `arrays`, returns [chunk, ...].
         arrays: each [receivers, ...], or None, which is handed on as it is. The first is not None.
         vpl_count: VPLs that each receiver is paired with.
-        pairs_at_once: pairs in a chunk, roughly; chunks have a power of two of receivers.
+        pairs_at_once: most pairs in a chunk.
 
     Returns:
         [receivers, ...].
     """
     count = arrays[0].shape[0]
-    size = 2 ** max((pairs_at_once // max(vpl_count, 1)).bit_length() - 1, 0)
-    size = min(size, max(count, 1))
+    size = min(receivers_at_once(vpl_count, pairs_at_once), max(count, 1))
 
     def chunked(values: Any) -> Any:
         padded = jnp.pad(values, ((0, -count % size), *[(0, 0)] * (values.ndim - 1)))

@@ -9,7 +9,7 @@ import pytest
 from made_priors import made_prior
 
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters, parameter_spec
-from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS, AutoPrior, place_of, value_at
+from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS, AutoPrior
 from vpltune.renderer.config.config_schema import config_schema
 from vpltune.renderer.config.scene_statistics import STATISTIC_NAMES
 from vpltune.renderer.config.tuned_config import (
@@ -107,9 +107,9 @@ def test_a_prior_is_not_exported_as_constants(form):
 @pytest.mark.parametrize("spec", ARTIST_PARAMETERS, ids=lambda spec: spec.name)
 def test_places_and_values_undo_each_other(spec):
     for place in (0.0, 0.3, 1.0):
-        assert place_of(spec, value_at(spec, place)) == pytest.approx(place, abs=1e-12)
-    assert value_at(spec, place_of(spec, spec.low)) == spec.low
-    assert value_at(spec, 1.0 + 1e-12) <= spec.high
+        assert spec.place_of(spec.value_at(place)) == pytest.approx(place, abs=1e-12)
+    assert spec.within(spec.place_of(spec.low)) == spec.low
+    assert spec.within(1.0 + 1e-12) <= spec.high
 
 
 def test_a_prior_stays_where_it_was_trained():
@@ -123,5 +123,5 @@ def test_a_prior_stays_where_it_was_trained():
 
 def test_the_value_at_a_place_is_the_tables_scale():
     """α runs logarithmically from 0.05 to 20: halfway lies their geometric mean."""
-    assert value_at(parameter_spec("falloff_footprint"), 0.5) == pytest.approx(1.0)
-    assert value_at(parameter_spec("extinction_coefficient"), 0.5) == pytest.approx(4.0)
+    assert parameter_spec("falloff_footprint").value_at(0.5) == pytest.approx(1.0)
+    assert parameter_spec("extinction_coefficient").value_at(0.5) == pytest.approx(4.0)

@@ -4,7 +4,6 @@ import json
 import math
 import re
 from importlib.resources import files
-from pathlib import Path
 
 import jsonschema
 import pytest
@@ -17,7 +16,6 @@ from vpltune.renderer.config.config_schema import config_schema
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import (
     DEEPEST_LIGHT,
-    MAXIMUM_FILE_BYTES,
     FitNote,
     TunedConfig,
     config_text,
@@ -377,26 +375,3 @@ def test_whole_numbers_written_as_fractions_are_taken():
     assert config.quality.as_dict() == {**quality, "adaptation_frames": 15.0, "budget": budget}
     whole = (config.quality.interleave, config.quality.map_size, config.quality.rsm_resolution)
     assert all(isinstance(value, int) for value in (*whole, config.parameters.lloyd_iterations))
-
-
-def test_files_that_are_not_text_or_not_there(tmp_path):
-    with pytest.raises(InputError, match=r"absent.json: cannot be read \(No such file"):
-        read_config(tmp_path / "absent.json")
-    with pytest.raises(InputError, match=r"cannot be read \(Is a directory"):
-        read_config(tmp_path)
-    (tmp_path / "binary.json").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="not UTF-8 text"):
-        read_config(tmp_path / "binary.json")
-    (tmp_path / "long.json").write_bytes(b" " * (MAXIMUM_FILE_BYTES + 1))
-    with pytest.raises(InputError, match="this file is longer"):
-        read_config(tmp_path / "long.json")
-
-
-def test_a_device_without_end_is_refused():
-    with pytest.raises(InputError, match="this file is longer"):
-        read_config(Path("/dev/zero"))
-
-
-def test_a_byte_order_mark_is_passed_over(tmp_path):
-    (tmp_path / "bom.json").write_bytes(b"\xef\xbb\xbf" + config_text(TunedConfig()).encode())
-    assert read_config(tmp_path / "bom.json") == TunedConfig()

@@ -8,7 +8,7 @@ from built_scenes import ROOM_LIGHTS, colored_room, room_view
 from made_priors import made_prior
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
-from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS, place_of
+from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.clip_state import ClipState
@@ -30,7 +30,7 @@ def runtime(gl_context) -> Runtime:
 
 def places(parameters: ArtistParameters) -> np.ndarray:
     values = parameters.as_dict()
-    return np.array([place_of(parameter_spec(name), values[name]) for name in AUTO_PARAMETERS])
+    return np.array([parameter_spec(name).place_of(values[name]) for name in AUTO_PARAMETERS])
 
 
 def drawn_places(runtime: Runtime, view, config=CONFIG, state: ClipState | None = None) -> np.ndarray:

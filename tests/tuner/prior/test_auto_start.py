@@ -7,7 +7,7 @@ from vpltune import configs
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.tuner.scene_fit.evaluate_scene import EvaluateOptions, evaluate_scene
-from vpltune.tuner.scene_fit.fit_scene import fit_start
+from vpltune.tuner.scene_fit.prior_in_fit import fit_start
 
 BASE = ArtistParameters(vpl_count=16)
 CONFIG = TunedConfig(BASE, visibility="maps", auto=made_prior(strength=0.05))

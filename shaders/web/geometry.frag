@@ -1,6 +1,6 @@
 // The G-buffer, with its reversed depth in a colour target too: WebGL reads no depth buffer as floats.
 #define main surface_main
-#include "geometry.frag"
+#include "geometry/geometry.frag"
 #undef main
 #include "web/plane_depth.glsl"
 #include "web/rounded_normal.glsl"

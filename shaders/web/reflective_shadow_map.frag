@@ -1,6 +1,6 @@
 // One face of the RSM, with its reversed depth in a colour target too.
 #define main surface_main
-#include "reflective_shadow_map.frag"
+#include "reflective_shadow_map/reflective_shadow_map.frag"
 #undef main
 #include "web/plane_depth.glsl"
 #include "web/rounded_normal.glsl"

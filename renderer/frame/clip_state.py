@@ -6,6 +6,8 @@ import moderngl
 class ClipState:
     """The eased parameters of an `auto` config, on the GPU. Make one for each clip, and none for a still.
 
+    It stays with the OpenGL context that it was first drawn on.
+
     Example:
         >>> state = ClipState()
         >>> for view in views:
@@ -16,7 +18,13 @@ class ClipState:
         self._buffers: dict[str, moderngl.Buffer] = {}
 
     def buffer(self, context: moderngl.Context, name: str, size: int) -> moderngl.Buffer:
-        """The buffer called `name` of `size` bytes, zero before its first use."""
+        """The buffer called `name` of `size` bytes, zero before its first use.
+
+        Raises:
+            ValueError: it is of another context.
+        """
         if name not in self._buffers:
             self._buffers[name] = context.buffer(bytes(size))
+        if self._buffers[name].ctx is not context:
+            raise ValueError("state: a clip is drawn on one OpenGL context, and this is another")
         return self._buffers[name]

@@ -38,14 +38,14 @@ _SHARES = {"direct": (1.0, 0.0), "indirect": (0.0, 1.0)}
 
 
 def _on_own_context(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Make the runtime's context current before a call: another runtime may have taken its place.
+    """Make the object's context current before a call: another runtime may have taken its place.
 
     It stays current. moderngl's `with context` would leave none current behind it, not the one before.
     """
 
     @functools.wraps(method)
-    def on_own_context(self: "Runtime", *arguments: object, **keywords: object) -> Any:
-        self._context.__enter__()
+    def on_own_context(self: "Runtime | DrawnFrame", *arguments: object, **keywords: object) -> Any:
+        self.context.__enter__()
         return method(self, *arguments, **keywords)
 
     return on_own_context
@@ -61,25 +61,34 @@ class DrawnFrame:
         self._config = config
 
     @property
+    def context(self) -> moderngl.Context:
+        """The OpenGL context that it was drawn on."""
+        return self.frame.resources.context
+
+    @property
     def display(self) -> moderngl.Texture:
         """The 8-bit display image, row 0 at the bottom."""
         return self.frame.texture("display")
 
+    @_on_own_context
     def read_exposure(self) -> float:
         """What radiance was multiplied by for display: waits for the GPU."""
         return self.frame.read_exposure()
 
+    @_on_own_context
     def read_parameters(self) -> ArtistParameters:
         """The parameters that it was drawn with; waits for the GPU where a prior set some of them."""
         return self._config.parameters if self._config.auto is None else self.frame.read_parameters()
 
+    @_on_own_context
     def capture(self, *, maps: bool = True) -> CapturedFrame:
         """Read back the buffers that the gather reads and makes; `maps` False leaves out visibility maps."""
         discs = self._config.parameters.vpls_are_discs
         captured = capture_frame(self.frame, self._view, discs=discs, maps=maps)
-        check_errors(self.frame.resources.context, f"the buffers of view {self._view.name}")
+        check_errors(self.context, f"the buffers of view {self._view.name}")
         return captured
 
+    @_on_own_context
     def read_statistics(self) -> Float32[np.ndarray, " statistics"]:
         """The scene statistics that `renderer.config.scene_statistics` names: waits for the GPU."""
         return self.frame.read_statistics(self.inputs)

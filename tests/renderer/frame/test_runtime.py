@@ -1,10 +1,15 @@
 """The runtime's own promises: contexts, layers, exposure."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from built_scenes import colored_room, room_view
+from made_priors import made_prior
 
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.clip_state import ClipState
 from vpltune.renderer.frame.runtime import LAYERS, Runtime
 
 CONFIG = TunedConfig()
@@ -18,6 +23,45 @@ def test_runtimes_do_not_disturb_each_other():
     other = second.render(room_view("point"), CONFIG, layer="irradiance")
     np.testing.assert_array_equal(first.render(room_view("spot"), CONFIG, layer="irradiance"), alone)
     np.testing.assert_array_equal(second.render(room_view("point"), CONFIG, layer="irradiance"), other)
+
+
+def test_a_drawn_frame_is_read_on_its_own_context():
+    """Whatever context another runtime has made current since."""
+    config = replace(CONFIG, auto=made_prior(), quality=Quality(rsm_resolution=64, map_size=8))
+    drawn = Runtime(colored_room()).draw(room_view("spot", (16, 12)), config)
+
+    def found() -> tuple:
+        captured = drawn.capture()
+        return (
+            drawn.read_exposure(),
+            drawn.read_parameters(),
+            drawn.read_statistics().tolist(),
+            captured.indirect_irradiance.tolist(),
+            captured.visibility_maps.texels.tolist(),
+        )
+
+    before = found()
+    other = Runtime(colored_room())
+    for reading in (
+        lambda: drawn.read_exposure() == before[0],
+        lambda: drawn.read_parameters() == before[1],
+        lambda: drawn.read_statistics().tolist() == before[2],
+        lambda: found() == before,
+    ):
+        other.draw(room_view("point", (20, 12)), CONFIG)
+        assert reading()
+
+
+def test_a_clip_does_not_change_its_context(gl_context):
+    """Its state lies on the GPU, and another context would read something else there."""
+    config = replace(CONFIG, auto=made_prior(), quality=Quality(rsm_resolution=64, map_size=8))
+    state, view = ClipState(), room_view("spot", (16, 12))
+    first = Runtime(colored_room(), context=gl_context)
+    first.draw(view, config, state)
+    Runtime(colored_room(), context=gl_context).draw(view, config, state)
+    with pytest.raises(ValueError, match="a clip is drawn on one OpenGL context"):
+        Runtime(colored_room()).draw(view, config, state)
+    first.draw(view, config, state)
 
 
 @pytest.mark.parametrize("layer", LAYERS)

@@ -1,4 +1,4 @@
-"""`vpltune fit --budget-ms`: what it measured is what every other command draws with its config alone."""
+"""What `vpltune fit` measured is what every other command draws with its config alone, to a budget or not."""
 
 import json
 from pathlib import Path
@@ -9,8 +9,9 @@ from PIL import Image
 from steady_clock import steady_clock
 
 from vpltune.__main__ import run
+from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
-from vpltune.renderer.config.tuned_config import read_config
+from vpltune.renderer.config.tuned_config import TunedConfig, read_config, write_config
 from vpltune.renderer.files.image_file import read_exr
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.files import read_scene
@@ -21,23 +22,31 @@ from vpltune.tuner.frame_time import frame_budget
 SCENE = Path(__file__).resolve().parents[2] / "configs" / "scenes" / "cornell-box.glb"
 BUDGET = 5.5
 """Milliseconds by the formula: too few for the default's RSM, and some 180 VPLs with what may be chosen."""
+CHOICE = {"interleave": 4, "map_size": 8, "rsm_resolution": 256}
+"""What is left to choose, and none of it the default."""
 
 pytestmark = pytest.mark.slow  # a fit with a cold reference cache
 
 
-@pytest.fixture(scope="module")
-def fitted(tmp_path_factory):
-    """Where the shipped box is fitted to a budget by the formula; what may be chosen is not the default."""
-    folder = tmp_path_factory.mktemp("budget")
-    command = ["fit", str(SCENE), "-o", str(folder / "out"), "--budget-ms", str(BUDGET), "--views", "1"]
+@pytest.fixture(scope="module", params=["budget", "start"])
+def fitted(request, tmp_path_factory):
+    """Where the shipped box is fitted: to a budget by the formula, or from a start with the same quality."""
+    folder = tmp_path_factory.mktemp(request.param)
+    command = ["fit", str(SCENE), "-o", str(folder / "out"), "--views", "1", "--size", "32x24"]
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("VPLTUNE_CACHE", str(folder / "cache"))
-        steady_clock(patch)
-        patch.setattr(frame_budget, "INTERLEAVES", (4,))
-        patch.setattr(frame_budget, "MAP_SIZES", (8,))
-        patch.setattr(frame_budget, "HELD_OUT_ROTATIONS", 2)
-        patch.setattr(frame_budget, "ROTATIONS", 2)
-        assert run([*command, "--size", "32x24"]) == 0
+        if request.param == "budget":
+            steady_clock(patch)
+            patch.setattr(frame_budget, "INTERLEAVES", (CHOICE["interleave"],))
+            patch.setattr(frame_budget, "MAP_SIZES", (CHOICE["map_size"],))
+            patch.setattr(frame_budget, "HELD_OUT_ROTATIONS", 2)
+            patch.setattr(frame_budget, "ROTATIONS", 2)
+            command += ["--budget-ms", str(BUDGET)]
+        else:
+            start = TunedConfig(ArtistParameters(vpl_count=128), quality=Quality(**CHOICE))
+            write_config(folder / "start.json", start)
+            command += ["--config", str(folder / "start.json")]
+        assert run(command) == 0
         yield folder
 
 
@@ -46,15 +55,17 @@ def document(fitted):
     return json.loads((fitted / "out" / "metrics.json").read_text())
 
 
-def test_the_config_says_what_met_the_budget(fitted, document):
+def test_the_config_says_how_it_was_measured(fitted, document):
     quality = read_config(fitted / "out" / "tuned.json").quality
     assert document["quality"] == quality.as_dict()
-    assert quality.budget.milliseconds == BUDGET
-    assert quality.budget.frame_size == (32, 24)
-    choice = document["budget"]["choice"]
-    assert choice == {"interleave": 4, "map_size": 8, "rsm_resolution": 256}
-    for name, chosen in choice.items():
-        assert getattr(quality, name) == chosen != getattr(Quality(), name)
+    assert all(
+        getattr(quality, name) == chosen != getattr(Quality(), name) for name, chosen in CHOICE.items()
+    )
+    if "budget" in document:
+        assert document["budget"]["choice"] == CHOICE
+        assert (quality.budget.milliseconds, quality.budget.frame_size) == (BUDGET, (32, 24))
+    else:
+        assert quality == Quality(**CHOICE)
 
 
 def test_render_draws_what_was_measured(fitted, document, capfd):

@@ -100,7 +100,6 @@ def main(folder, output):
     vpls, length = virtual_point_lights(atlas, np.dstack([pixels(one) for one in images]), bundle)
     for binding, content in ((4, vpls), (5, bytes(16 * max(maps["map_room"], 1))), (6, bytes(4))):
         context.buffer(content).bind_to_storage_buffer(binding)
-    numbers["extinction_coefficient"] *= bundle["config"]["visibility"] != "none"
     clustered = bundle["clustered_discs"]
     numbers |= {"scene_length": length, "face_size": rsm["resolution"], "disc_lights": clustered["steps"]}
     numbers |= clustered["disc"] | maps

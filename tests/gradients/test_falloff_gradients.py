@@ -38,12 +38,11 @@ def test_gradient_is_the_runtimes_own(gl_context, light, name, start):
     """
     cells = start.lloyd_iterations > 0
     step = STEP[name] / (10.0 if cells and name == "falloff_footprint" else 1.0)
-    runtime = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context)
+    runtime = Runtime(colored_room(), context=gl_context)
     images = []
     for sign in (-1.0, 1.0):
-        values = {**start.as_dict(), name: getattr(start, name) + sign * step}
-        runtime.parameters = ArtistParameters(**values)
-        captured = runtime.capture(room_view(light))
+        moved = replace(start, **{name: getattr(start, name) + sign * step})
+        captured = runtime.capture(room_view(light), WITHOUT_MAPS.with_parameters(moved))
         images.append(captured.indirect_irradiance[captured.valid].astype(np.float64))
     finite = (images[1] - images[0]) / (2.0 * step)
 
@@ -62,7 +61,7 @@ def test_tabulated_gradient_follows_the_full_gather(gl_context):
 
     The table errs by up to 0.1 % in the image.
     """
-    captured = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context).capture(room_view("spot"))
+    captured = Runtime(colored_room(), context=gl_context).capture(room_view("spot"), WITHOUT_MAPS)
     receivers, vpls = gather_inputs(captured)
     table = tabulate_gather(receivers, vpls)
     truth = np.asarray(gather(receivers, vpls, FalloffParameters(*map(jnp.float32, (0.9, 0.4, 0.3)))))

@@ -1,7 +1,5 @@
 """The surrogate's gather against the runtime's, on the same buffers."""
 
-from dataclasses import replace
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -56,8 +54,7 @@ CELLS = (
 
 
 def twin_error(runtime: Runtime, view: View, parameters: ArtistParameters) -> float:
-    runtime.parameters = parameters
-    captured = runtime.capture(view)
+    captured = runtime.capture(view, WITHOUT_MAPS.with_parameters(parameters))
     receivers, vpls = gather_inputs(captured)
     image = np.asarray(jax.jit(gather)(receivers, vpls, FalloffParameters.of(parameters)))
     drawn = captured.indirect_irradiance[captured.valid]
@@ -71,7 +68,7 @@ def twin_error(runtime: Runtime, view: View, parameters: ArtistParameters) -> fl
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_twins_agree_in_the_room(gl_context, light, parameters):
     """The relative RMSE is below 1e-4: both twins use float32, in different coordinates."""
-    runtime = Runtime(colored_room(), TunedConfig(parameters, visibility="transmittance"), context=gl_context)
+    runtime = Runtime(colored_room(), context=gl_context)
     assert twin_error(runtime, room_view(light), parameters) < 1e-4
 
 
@@ -79,10 +76,8 @@ def scene_twin_error(path, gl_context) -> float:
     scene = read_scene(path)
     camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
     view = View(path.stem, "fitted", (96, 72), camera, lights)
-    runtime = Runtime(scene, WITHOUT_MAPS, context=gl_context)
-    points = max(twin_error(runtime, view, parameters) for parameters in PARAMETERS)
-    few = Runtime(scene, replace(WITHOUT_MAPS, parameters=CELLS[0]), context=gl_context)
-    return max(points, twin_error(few, view, CELLS[0]))
+    runtime = Runtime(scene, context=gl_context)
+    return max(twin_error(runtime, view, parameters) for parameters in (*PARAMETERS, CELLS[0]))
 
 
 @pytest.mark.parametrize("path", OWN_SCENES, ids=lambda path: path.stem)
@@ -97,11 +92,11 @@ def test_twins_agree_on_scenes_of_others(gl_context, scenes_folder, name):
     assert scene_twin_error(outside_scene(scenes_folder, name), gl_context) < 1e-3
 
 
-@pytest.mark.parametrize("config", [WITHOUT_MAPS, replace(WITHOUT_MAPS, parameters=CELLS[0])])
+@pytest.mark.parametrize("config", [WITHOUT_MAPS, WITHOUT_MAPS.with_parameters(CELLS[0])])
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_factored_gather_equals_its_definition(gl_context, light, config):
     """Axis by axis and pair by pair agree to a relative RMSE of 1e-4: float32 in another order."""
-    captured = Runtime(colored_room(), config, context=gl_context).capture(room_view(light, (32, 24)))
+    captured = Runtime(colored_room(), context=gl_context).capture(room_view(light, (32, 24)), config)
     receivers, vpls = gather_inputs(captured)
     for parameters in map(FalloffParameters.of, PARAMETERS):
         pairwise = np.asarray(gather_pairwise(receivers, vpls, parameters))
@@ -111,7 +106,7 @@ def test_factored_gather_equals_its_definition(gl_context, light, config):
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_tabulated_gather_is_close(gl_context, light):
     """In the range where fits end, interpolation between nodes errs by less than 0.2 % relative RMSE."""
-    captured = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context).capture(room_view(light))
+    captured = Runtime(colored_room(), context=gl_context).capture(room_view(light), WITHOUT_MAPS)
     receivers, vpls = gather_inputs(captured)
     table = tabulate_gather(receivers, vpls)
     for alpha in (0.05, 0.5, 1.0, 3.0):
@@ -124,8 +119,8 @@ def test_tabulated_gather_is_close(gl_context, light):
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_tabulated_gather_of_discs_is_close(gl_context, light):
     """The error is below 4 % for 32 discs, whose edges cross receivers between nodes of α; 0.3 % at α = 1."""
-    config = replace(WITHOUT_MAPS, parameters=CELLS[0])
-    captured = Runtime(colored_room(), config, context=gl_context).capture(room_view(light))
+    config = WITHOUT_MAPS.with_parameters(CELLS[0])
+    captured = Runtime(colored_room(), context=gl_context).capture(room_view(light), config)
     receivers, vpls = gather_inputs(captured)
     assert vpls.cells
     table = tabulate_gather(receivers, vpls)
@@ -139,7 +134,8 @@ def test_tabulated_gather_of_discs_is_close(gl_context, light):
 
 def test_hidden_vpls_give_nothing(gl_context):
     """A visibility mask removes exactly its pairs, in the full and in the tabulated gather."""
-    captured = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context).capture(room_view("spot", (32, 24)))
+    runtime = Runtime(colored_room(), context=gl_context)
+    captured = runtime.capture(room_view("spot", (32, 24)), WITHOUT_MAPS)
     receivers, vpls = gather_inputs(captured)
     parameters = FalloffParameters.of(ArtistParameters())
     shape = (len(receivers.position), len(vpls.position))
@@ -156,7 +152,8 @@ def test_nothing_lit_is_finite():
     floor = colored_room()
     camera = Camera(look_at(np.array([0.0, 0.0, 3.6]), np.zeros(3)), 0.7)
     away = Light("spot", np.ones(3), np.array([0.0, 0.0, 3.0]), np.array([0.0, 0.0, 1.0]), 0.1, 0.3)
-    captured = Runtime(floor, "default").capture(View("dark", "fitted", (16, 12), camera, (away,)))
+    view = View("dark", "fitted", (16, 12), camera, (away,))
+    captured = Runtime(floor).capture(view, TunedConfig())
     receivers, vpls = gather_inputs(captured)
     assert not np.asarray(gather(receivers, vpls, FalloffParameters.of(ArtistParameters()))).any()
     assert not np.asarray(

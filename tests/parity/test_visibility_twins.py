@@ -1,5 +1,7 @@
 """Visibility maps: the shader's lookup against its JAX twin, and properties that true visibility has."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -8,10 +10,10 @@ from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
 from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import CapturedFrame
 from vpltune.renderer.frame.runtime import Runtime
-from vpltune.renderer.frame.runtime_options import RuntimeOptions
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.placement import resolve_camera_and_lights
 from vpltune.renderer.scene.scene import Camera, Light, look_at, scaled
@@ -48,8 +50,8 @@ def test_twins_agree_in_the_room(gl_context, light, bias, softness):
     light.
     """
     parameters = ArtistParameters(vpl_count=256, visibility_bias=bias, visibility_softness=softness)
-    runtime = Runtime(colored_room(), TunedConfig(parameters, visibility="maps"), context=gl_context)
-    captured = runtime.capture(room_view(light))
+    runtime = Runtime(colored_room(), context=gl_context)
+    captured = runtime.capture(room_view(light), MAPS.with_parameters(parameters))
     drawn = captured.vpl_irradiance[captured.valid]
     assert drawn.any()
     assert relative_rms(surrogate(captured, parameters), drawn) < 1e-3
@@ -58,9 +60,8 @@ def test_twins_agree_in_the_room(gl_context, light, bias, softness):
 def scene_twin_error(path, gl_context) -> float:
     scene = read_scene(path)
     camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
-    captured = Runtime(scene, MAPS, context=gl_context).capture(
-        View(path.stem, "fitted", (64, 48), camera, lights)
-    )
+    view = View(path.stem, "fitted", (64, 48), camera, lights)
+    captured = Runtime(scene, context=gl_context).capture(view, MAPS)
     drawn = captured.vpl_irradiance[captured.valid]
     image = surrogate(captured, PARAMETERS)
     return relative_rms(image, drawn) if drawn.any() else float(np.abs(image).max())
@@ -99,9 +100,8 @@ def behind_the_wall(gl_context, with_wall: bool, visibility: str) -> np.ndarray:
     target = np.array([1.0, 0.0, 0.0])
     camera = Camera(look_at(target + np.array([0.3, 1.5, 0.0]), target), 0.15)
     config = TunedConfig(PARAMETERS, visibility=visibility)
-    captured = Runtime(walled_scene(with_wall), config, context=gl_context).capture(
-        View("patch", "fitted", (8, 8), camera, (light,))
-    )
+    view = View("patch", "fitted", (8, 8), camera, (light,))
+    captured = Runtime(walled_scene(with_wall), context=gl_context).capture(view, config)
     assert captured.valid.all()
     return captured.vpl_irradiance
 
@@ -130,9 +130,13 @@ def test_scale_changes_nothing(gl_context, factor):
     Because of rounding, a ray that grazes an edge may pass it on the other side, which changes one texel of a
     map.
     """
-    image = Runtime(colored_room(), MAPS, context=gl_context).render(room_view("spot"), "irradiance")
-    grown = Runtime(scaled(colored_room(), factor), MAPS, context=gl_context)
-    assert relative_rms(grown.render(scaled_view(room_view("spot"), factor), "irradiance"), image) < 1e-3
+    image, grown = (
+        Runtime(scaled(colored_room(), scale), context=gl_context).render(
+            scaled_view(room_view("spot"), scale), MAPS, layer="irradiance"
+        )
+        for scale in (1.0, factor)
+    )
+    assert relative_rms(grown, image) < 1e-3
 
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
@@ -140,18 +144,20 @@ def test_more_vpls_keep_the_mean(gl_context, light):
     """Doubling the VPL count with maps changes the mean irradiance by less than 1 %, as without maps."""
     means = []
     for count in (1024, 2048):
-        config = TunedConfig(ArtistParameters(vpl_count=count), visibility="maps")
-        captured = Runtime(colored_room(), config, context=gl_context).capture(room_view(light, (96, 72)))
+        config = MAPS.with_parameters(ArtistParameters(vpl_count=count))
+        captured = Runtime(colored_room(), context=gl_context).capture(room_view(light, (96, 72)), config)
         means.append(captured.vpl_irradiance[captured.valid].mean())
     assert means[1] == pytest.approx(means[0], rel=1e-2)
 
 
 def test_finer_texels_lie_at_silhouettes_alone(gl_context):
     """A room with a board in it has some refined texels. A floor with a wall, which is convex, has none."""
-    room = Runtime(colored_room(), MAPS, context=gl_context).capture(room_view("spot")).visibility_maps
+    room, corner = (
+        Runtime(scene, context=gl_context).capture(room_view("spot"), MAPS).visibility_maps
+        for scene in (colored_room(), walled_scene(False))
+    )
     assert 0.01 < (room.block >= 0).mean() < 0.2
     assert len(room.block_distance) == (room.block >= 0).sum()
-    corner = Runtime(walled_scene(False), MAPS, context=gl_context).capture(room_view("spot")).visibility_maps
     assert not (corner.block >= 0).any()
 
 
@@ -160,11 +166,11 @@ def test_refined_maps_are_nearly_maps_so_much_finer(gl_context):
 
     A fifth was measured. The remaining error is due to objects so small that no neighbouring texel hit them.
     """
-    scene, view = colored_room(), room_view("spot")
+    runtime = Runtime(colored_room(), context=gl_context)
 
     def light(size: int, refinement: int) -> np.ndarray:
-        options = RuntimeOptions(visibility_map_size=size, visibility_map_refinement=refinement)
-        return Runtime(scene, MAPS, options, context=gl_context).capture(view).vpl_irradiance
+        config = replace(MAPS, quality=Quality(map_size=size, map_refinement=refinement))
+        return runtime.capture(room_view("spot"), config).vpl_irradiance
 
     finer = light(48, 1)
     assert relative_rms(light(24, 2), finer) < relative_rms(light(24, 1), finer) / 3.0

@@ -26,14 +26,13 @@ WITHOUT_MAPS = TunedConfig(visibility="transmittance")
 def drawn_by_the_runtime(runtime: Runtime, light: str, parameters: ArtistParameters) -> CapturedView:
     """A view whose reference is the runtime's own image with known parameters."""
     view = room_view(light)
-    runtime.parameters = parameters
-    captured = runtime.capture(view)
+    captured = runtime.capture(view, WITHOUT_MAPS.with_parameters(parameters))
     return CapturedView(view, own_reference(captured), captured)
 
 
 @pytest.fixture(scope="module")
 def planted_views(gl_context):
-    runtime = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context)
+    runtime = Runtime(colored_room(), context=gl_context)
     return tuple(drawn_by_the_runtime(runtime, light, PLANTED) for light in ("spot", "point"))
 
 
@@ -59,7 +58,7 @@ def test_a_fit_never_ends_above_its_start(planted_views):
 
 def test_nothing_lit_is_a_status(gl_context):
     """For a view without light the fit keeps the start, and its status says why."""
-    runtime = Runtime(colored_room(), WITHOUT_MAPS, context=gl_context)
+    runtime = Runtime(colored_room(), context=gl_context)
     view = drawn_by_the_runtime(runtime, None, PLANTED)
     fit = fit_placement((view,), PLANTED)
     assert fit.descent.status is FitStatus.NOTHING_LIT

@@ -32,9 +32,9 @@ PLANTED = ArtistParameters(
 
 def drawn_by_the_runtime(gl_context, light: str, parameters: ArtistParameters) -> CapturedView:
     """A view whose reference is the runtime's own image with known parameters."""
-    runtime = Runtime(colored_room(), TunedConfig(parameters, visibility="maps"), context=gl_context)
     view = room_view(light)
-    captured = runtime.capture(view)
+    config = TunedConfig(parameters, visibility="maps")
+    captured = Runtime(colored_room(), context=gl_context).capture(view, config)
     return CapturedView(view, own_reference(captured), captured)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from built_scenes import colored_room
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.scene.scene import Texture
 
@@ -17,7 +18,18 @@ CONFIG = TunedConfig(
         intensity=1.3, falloff_footprint=0.8, extinction_coefficient=0.4, vpl_count=200, density_exponent=0.7
     ),
     visibility="transmittance",
+    quality=Quality(rsm_resolution=256),
 )
+
+
+def with_resolution(config: TunedConfig, texels: int) -> TunedConfig:
+    """With so many texels along the side of an RSM face."""
+    return dataclasses.replace(config, quality=dataclasses.replace(config.quality, rsm_resolution=texels))
+
+
+def with_parameters(config: TunedConfig, **changes: float) -> TunedConfig:
+    """With some parameters changed."""
+    return config.with_parameters(dataclasses.replace(config.parameters, **changes))
 
 
 def textured_room():

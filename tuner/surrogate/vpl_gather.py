@@ -151,7 +151,7 @@ def gather(
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
 def _image(structure: Any, footprint: Array, transmittance: Array, *scene: Array) -> Array:
-    """The gather for k = π. `scene` and `structure`, a PyTreeDef, are flattened receivers, VPLs and visibility."""
+    """The gather for k = π. `structure` is the tree of receivers, VPLs and visibility, `scene` its leaves."""
     return _weighted_flux(partial(_weight, footprint, transmittance), *structure.unflatten(scene))
 
 

@@ -26,7 +26,7 @@ class Page {
     element("exposure").value = 0;
     this.showExposure();
     this.exposure = null;
-    this.choose(bundle.config.parameters, "tuned");
+    this.choose(tunedParameters, "tuned");
   }
 
   // Use a set of parameters, with the export's VPL count, so that tuned and default cost the same.
@@ -166,7 +166,7 @@ class Page {
       if (!this.asked) this.asked = requestAnimationFrame(() => this.step());
     };
     exposure.addEventListener("input", expose);
-    const tuned = () => this.choose(bundle.config.parameters, "tuned");
+    const tuned = () => this.choose(tunedParameters, "tuned");
     const plain = () => this.choose(Object.fromEntries(bundle.table.map((row) => [row.name, row.default])), "default");
     element("tuned").addEventListener("click", tuned);
     element("default").addEventListener("click", plain);
@@ -207,7 +207,9 @@ class Page {
 function describe() {
   element("name").textContent = bundle.scene;
   element("note").textContent = bundle.note;
-  const rows = { visibility: bundle.config.visibility, ...bundle.config.parameters, ...bundle.config.provenance };
+  const { visibility, fit, provenance } = bundle.config;
+  const ended = fit ? { status: fit.status, ...(fit.sentence && { fit: fit.sentence }) } : {};
+  const rows = { visibility, ...tunedParameters, ...ended, ...provenance };
   for (const [name, value] of Object.entries(rows)) {
     const [term, text] = [document.createElement("dt"), document.createElement("dd")];
     term.textContent = name.replaceAll("_", " ");

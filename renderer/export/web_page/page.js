@@ -8,6 +8,9 @@
 
 const bundle = JSON.parse(document.getElementById("bundle").textContent);
 const shaders = JSON.parse(document.getElementById("shaders").textContent);
+// A config file keeps the number of Lloyd iterations with its quality settings.
+const { lloyd_iterations } = bundle.config.quality;
+const tunedParameters = { ...bundle.config.parameters, lloyd_iterations };
 const BATCH = 32;  // VPLs gathered in one animation frame; a choice
 const FULLSCREEN = "web/fullscreen.vert";
 
@@ -485,11 +488,10 @@ class Frame {
   // Add the light of the VPLs from `first` up to, but not including, `end` to the indirect irradiance.
   gather(camera, parameters, first, end) {
     const [target, earlier] = this.indirect;
-    const extinction_coefficient = bundle.config.visibility === "none" ? 0 : parameters.extinction_coefficient;
     const { vpl_gather, vpl_gather_discs } = this.programs;
     fill(target, this.vplsAreDiscs ? vpl_gather_discs : vpl_gather, {
       ...this.cameraValues(camera), ...parameters, ...this.vplValues(this.vpls), ...this.momentSums,
-      extinction_coefficient, first, end, earlier: earlier.textures[0],
+      first, end, earlier: earlier.textures[0],
       visibility_atlas: this.visibility?.textures[0], visibility_details: this.visibilityDetails?.textures[0],
     });
     this.indirect.reverse();

@@ -11,9 +11,16 @@ import pytest
 
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
 from vpltune.renderer.config.parameter_block import pack_parameters, unpack_parameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import VISIBILITIES, TunedConfig, parse_config
 from vpltune.renderer.errors import InputError
-from vpltune.renderer.export.config_export import c_header, constant_name, exported, glsl_constants
+from vpltune.renderer.export.config_export import (
+    VISIBILITY_CODES,
+    c_header,
+    constant_name,
+    exported,
+    glsl_constants,
+)
 
 CONFIG = TunedConfig(
     ArtistParameters(
@@ -24,13 +31,18 @@ CONFIG = TunedConfig(
         density_exponent=0.0,
     ),
     {"scene": "a\nb é"},
+    quality=Quality(interleave=4, rsm_resolution=512),
 )
 
 
 def test_json_reads_back_and_is_normal():
     text = exported(CONFIG, "json").decode()
     assert parse_config(text, "text") == CONFIG
-    assert list(json.loads(text)["parameters"]) == [spec.name for spec in ARTIST_PARAMETERS]
+    document = json.loads(text)
+    assert list(document["parameters"]) == [
+        spec.name for spec in ARTIST_PARAMETERS if spec.part == "parameters"
+    ]
+    assert {spec.name for spec in ARTIST_PARAMETERS if spec.part == "quality"} <= set(document["quality"])
 
 
 def test_glsl_is_ascii_and_says_names_and_units():
@@ -60,7 +72,37 @@ def test_texts_hold_every_digit_and_the_visibility(visibility):
     ):
         found = dict(re.findall(pattern, text))
         assert {spec.name: float(found[constant_name(spec)]) for spec in ARTIST_PARAMETERS} == values
-        assert VISIBILITIES[int(found["VPL_VISIBILITY"])] == visibility
+        assert int(found["VPL_VISIBILITY"]) == VISIBILITY_CODES[visibility]
+
+
+def test_codes_of_the_visibility_are_those_that_shaders_were_written_for():
+    """0 was a mode that is no more; the others keep their numbers."""
+    assert VISIBILITY_CODES == {"transmittance": 1, "maps": 2}
+    for visibility, code in VISIBILITY_CODES.items():
+        text = glsl_constants(CONFIG.seen_by(visibility))
+        assert f"const int VPL_VISIBILITY = {code}; // 1 transmittance, 2 maps\n" in text
+        assert f"#define VPL_VISIBILITY {code} " in c_header(CONFIG.seen_by(visibility))
+
+
+@pytest.mark.parametrize(
+    ("quality", "expected"),
+    [
+        (Quality(), {"INTERLEAVE": 1, "MAP_SIZE": 24, "MAP_REFINEMENT": 4, "RSM_RESOLUTION": 0}),
+        (
+            Quality(interleave=8, map_size=12, map_refinement=1, rsm_resolution=512),
+            {"INTERLEAVE": 8, "MAP_SIZE": 12, "MAP_REFINEMENT": 1, "RSM_RESOLUTION": 512},
+        ),
+    ],
+)
+def test_the_quality_settings_are_constants_too(quality, expected):
+    """A resolution of 0 texels leaves it to who reads it."""
+    config = TunedConfig(quality=quality)
+    for text, pattern in (
+        (glsl_constants(config), r"^const int VPL_(\w+) = (\d+);$"),
+        (c_header(config), r"^#define VPL_(\w+) (\d+)$"),
+    ):
+        found = {name: int(value) for name, value in re.findall(pattern, text, re.MULTILINE)}
+        assert found == expected
 
 
 def test_std140_bytes_are_the_parameter_block():

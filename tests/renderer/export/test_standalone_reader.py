@@ -8,13 +8,14 @@ import sys
 import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
-from exported_frames import CONFIG, READER, SCENES, textured_room
+from exported_frames import CONFIG, READER, SCENES, textured_room, with_parameters, with_resolution
 from PIL import Image
 
 from vpltune import Runtime
 from vpltune.__main__ import run
-from vpltune.renderer.config.tuned_config import TunedConfig
-from vpltune.renderer.export.scene_bundle import scene_bundle, write_bundle
+from vpltune.renderer.config.quality import Quality
+from vpltune.renderer.config.tuned_config import TunedConfig, parse_config
+from vpltune.renderer.export.scene_bundle import left_out, scene_bundle, write_bundle
 from vpltune.renderer.scene.scene import look_at
 from vpltune.tuner.fitting.fit_density import DISC_FOOTPRINT
 
@@ -38,7 +39,7 @@ def read_image(folder, output):
 @pytest.mark.parametrize(
     ("light", "visibility"),
     [
-        ("spot", "none"),
+        ("spot", "unattenuated"),
         ("spot", "transmittance"),
         ("wide_spot", "transmittance"),
         ("point", "transmittance"),
@@ -48,10 +49,14 @@ def read_image(folder, output):
     ],
 )
 def test_the_image_is_the_runtimes(tmp_path, light, visibility):
-    scene, view, config = textured_room(), room_view(light, (96, 72)), CONFIG.seen_by(visibility)
-    write_bundle(tmp_path, scene_bundle(scene, view, config, rsm_resolution=256))
+    scene, view = textured_room(), room_view(light, (96, 72))
+    if visibility == "unattenuated":
+        config = with_parameters(CONFIG, extinction_coefficient=0.0)
+    else:
+        config = CONFIG.seen_by(visibility)
+    write_bundle(tmp_path, scene_bundle(scene, view, config))
     image, said = read_image(tmp_path, tmp_path / "image.png")
-    ours = Runtime(scene, config, rsm_resolution=256).render(view)
+    ours = Runtime(scene).render(view, config)
     assert said == ""
     assert np.ptp(ours) > 100
     difference = np.abs(image.astype(int) - ours)
@@ -65,9 +70,10 @@ def test_several_lights_share_the_vpls(tmp_path):
     view = dataclasses.replace(
         view, lights=(ROOM_LIGHTS["directional"], ROOM_LIGHTS["point"], ROOM_LIGHTS["spot"])
     )
-    write_bundle(tmp_path, scene_bundle(scene, view, CONFIG, rsm_resolution=128))
+    config = with_resolution(CONFIG, 128)
+    write_bundle(tmp_path, scene_bundle(scene, view, config))
     image, _ = read_image(tmp_path, tmp_path / "image.png")
-    ours = Runtime(scene, CONFIG, rsm_resolution=128).render(view)
+    ours = Runtime(scene).render(view, config)
     assert (np.abs(image.astype(int) - ours).max(axis=-1) > 1).mean() < 1e-3
 
 
@@ -77,11 +83,8 @@ def test_nothing_lit_or_nothing_seen_is_black(tmp_path, turned):
     parameters = dataclasses.replace(
         CONFIG.parameters, vpl_count=8, density_importance=0.7, lloyd_iterations=2
     )
-    scene, view, config = (
-        colored_room(),
-        room_view("spot", (32, 24)),
-        TunedConfig(parameters, visibility="maps"),
-    )
+    scene, view = colored_room(), room_view("spot", (32, 24))
+    config = with_resolution(TunedConfig(parameters, visibility="maps"), 64)
     # Beyond all walls, and on outwards.
     outside = look_at(np.array([0.0, 0.0, 1e3]), np.array([0.0, 0.0, 2e3]))
     if turned == "light":
@@ -91,9 +94,9 @@ def test_nothing_lit_or_nothing_seen_is_black(tmp_path, turned):
         view = dataclasses.replace(view, lights=(light,))
     else:
         view = dataclasses.replace(view, camera=dataclasses.replace(view.camera, to_world=outside))
-    write_bundle(tmp_path, scene_bundle(scene, view, config, rsm_resolution=64))
+    write_bundle(tmp_path, scene_bundle(scene, view, config))
     image, said = read_image(tmp_path, tmp_path / "image.png")
-    ours = Runtime(scene, config, rsm_resolution=64).render(view)
+    ours = Runtime(scene).render(view, config)
     assert said == ""
     assert not image.any()
     assert not ours.any()
@@ -103,7 +106,7 @@ def test_nothing_lit_or_nothing_seen_is_black(tmp_path, turned):
     ("name", "visibility"),
     [
         ("cornell-box", "maps"),
-        ("cornell-box", "none"),
+        ("cornell-box", "transmittance"),
         pytest.param("gallery", "maps", marks=pytest.mark.slow),
     ],
 )
@@ -123,16 +126,13 @@ def test_a_shipped_scene_by_the_command_line(tmp_path, capfd, name, visibility):
 @pytest.mark.parametrize("placement", [{"lloyd_iterations": 8}, {"density_importance": 0.7}], ids=str)
 def test_few_vpls_are_placed_as_the_runtime_places_them(tmp_path, light, placement):
     """As cells, which shine as discs, or by what the camera sees."""
-    plain = dataclasses.replace(CONFIG.parameters, vpl_count=32, falloff_footprint=DISC_FOOTPRINT)
-    parameters = dataclasses.replace(plain, **placement)
+    plain = with_parameters(CONFIG, vpl_count=32, falloff_footprint=DISC_FOOTPRINT).seen_by("maps")
+    config = with_parameters(plain, **placement)
     scene, view = textured_room(), room_view(light, (96, 72))
-    bundle = scene_bundle(scene, view, TunedConfig(parameters, visibility="maps"), rsm_resolution=256)
-    write_bundle(tmp_path, bundle)
+    write_bundle(tmp_path, scene_bundle(scene, view, config))
     image, _ = read_image(tmp_path, tmp_path / "image.png")
-    ours, others = (
-        Runtime(scene, TunedConfig(form, visibility="maps"), rsm_resolution=256).render(view)
-        for form in (parameters, plain)
-    )
+    runtime = Runtime(scene)
+    ours, others = runtime.render(view, config), runtime.render(view, plain)
     assert (np.abs(image - ours.astype(int)).max(axis=-1) > 1).mean() < 1e-3
     assert (np.abs(image - others.astype(int)).max(axis=-1) > 3).mean() > 0.1
 
@@ -150,9 +150,40 @@ def test_a_bundle_is_json_that_describes_its_bytes(tmp_path):
     for name, array in document["arrays"].items():
         assert array["offset"] % 4 == 0 and array["offset"] + array["bytes"] <= len(content), name
         assert np.prod(array["shape"]) * np.dtype(array["type"]).itemsize == array["bytes"], name
-    assert document["config"]["parameters"] == CONFIG.parameters.as_dict()
+    assert parse_config(json.dumps(document["config"]), "bundle") == CONFIG
     assert len(document["rsm"]["faces"]) == 6
+    assert document["rsm"]["resolution"] == 256
     assert sum(draw["count"] for draw in document["draws"]) == textured_room().triangle_count()
+
+
+@pytest.mark.parametrize(("light", "texels"), [("spot", 1024), ("point", 512)])
+def test_a_config_without_a_resolution_leaves_it_to_the_number_of_faces(light, texels):
+    """As the runtime does."""
+    view, config = room_view(light, (16, 12)), TunedConfig()
+    rsm = scene_bundle(colored_room(), view, config).document["rsm"]
+    assert rsm["resolution"] == texels
+    assert Runtime(colored_room()).draw(view, config).frame.rsm.resolution == texels
+
+
+def test_the_quality_part_decides_the_maps():
+    quality = Quality(map_size=8, map_refinement=2, rsm_resolution=64)
+    config = TunedConfig(visibility="maps", quality=quality)
+    view = room_view("spot", (16, 12))
+    maps = scene_bundle(colored_room(), view, config).document["visibility_maps"]
+    assert (maps["map_size"], maps["map_refinement"]) == (8, 2)
+    maps = scene_bundle(colored_room(), view, config.seen_by("transmittance")).document["visibility_maps"]
+    assert set(maps.values()) == {0, 1}
+
+
+def test_what_is_left_out_is_said():
+    assert left_out(TunedConfig()) == ()
+    assert left_out(TunedConfig(quality=Quality(interleave=4))) == (
+        "Every pixel gathers every VPL here; only the runtime interleaves them",
+    )
+    near_field = with_parameters(TunedConfig(), screen_space_strength=1.0)
+    assert left_out(near_field) == ("The screen-space near field is drawn by the runtime alone",)
+    # Discs withhold nothing that a near field would give back.
+    assert left_out(with_parameters(near_field, lloyd_iterations=8)) == ()
 
 
 @pytest.mark.parametrize(

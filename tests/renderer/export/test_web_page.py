@@ -10,30 +10,26 @@ import runpy
 import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
-from exported_frames import CONFIG, READER, SCENES, textured_room
+from exported_frames import CONFIG, READER, SCENES, textured_room, with_parameters, with_resolution
 from headless_chromium import headless_chromium
 from PIL import Image
 
 from vpltune import Runtime
 from vpltune.__main__ import run
 from vpltune.renderer.config.artist_parameters import ArtistParameters
-from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.config.tuned_config import FitNote
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.export.scene_bundle import left_out, scene_bundle
 from vpltune.renderer.export.web_page import web_page
-from vpltune.renderer.frame.passes.clustered_discs import NORMAL_REACH
+from vpltune.renderer.frame.disc_samples import NORMAL_REACH
 from vpltune.renderer.gpu.camera_uniforms import camera_uniforms
 from vpltune.renderer.scene.light_faces import light_records
 from vpltune.renderer.scene.scene import Camera
 from vpltune.tuner.fitting.fit_density import DISC_FOOTPRINT
 
 SOFTWARE_GL = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-RESOLUTION = 256
-CELLS = TunedConfig(
-    dataclasses.replace(
-        CONFIG.parameters, vpl_count=32, lloyd_iterations=8, falloff_footprint=DISC_FOOTPRINT
-    ),
-    visibility="maps",
+CELLS = with_parameters(
+    CONFIG.seen_by("maps"), vpl_count=32, lloyd_iterations=8, falloff_footprint=DISC_FOOTPRINT
 )
 READ_TARGET = """name => {
   const target = [vpltune.frame[name]].flat().at(-1);
@@ -94,33 +90,38 @@ def image_of(page):
 
 
 def page_text(scene, view, config=CONFIG):
-    return web_page(scene_bundle(scene, view, config, rsm_resolution=RESOLUTION), left_out(config))
+    return web_page(scene_bundle(scene, view, config), left_out(config))
 
 
-def assert_same(image, runtime, view, exposure=None, *, textured=False, but=1e-3):
+def default_of(config):
+    """What the page's button draws: the table's defaults, at the same number of VPLs."""
+    return config.with_parameters(ArtistParameters(vpl_count=config.parameters.vpl_count))
+
+
+def assert_same(image, runtime, view, config, exposure=None, *, textured=False, but=1e-3):
     """To 3/255, where walls have textures to 8/255, in all but one pixel in a thousand.
 
     OpenGL leaves to the driver how textures are filtered at a slant: without anisotropy these walls agree to
     2/255. And rasterisers round corners to grids of their own, SwiftShader to 1/16 of a pixel: an edge
     that passes a pixel's centre closer than that may leave it on either side.
     """
-    ours = runtime.render(view, exposure=exposure).astype(int)
+    ours = runtime.render(view, config, exposure=exposure).astype(int)
     assert np.ptp(ours) > 100
-    side_walls = np.abs(runtime.render(view, "normal")[..., 0]) > 0.9
+    side_walls = np.abs(runtime.render(view, config, layer="normal")[..., 0]) > 0.9
     difference = np.abs(image - ours).max(axis=-1)
     differ = difference > np.where(side_walls & textured, 8, 3)
     assert differ.mean() < but, f"{differ.sum()} pixels, by up to {difference.max()}"
 
 
 def assert_same_image(page, scene, view, config=CONFIG, **tolerance):
-    runtime = Runtime(scene, config, rsm_resolution=RESOLUTION)
-    assert_same(image_of(page), runtime, view, textured=bool(scene.textures), **tolerance)
+    runtime = Runtime(scene)
+    assert_same(image_of(page), runtime, view, config, textured=bool(scene.textures), **tolerance)
 
 
 @pytest.mark.parametrize(
     ("light", "visibility"),
     [
-        ("spot", "none"),
+        ("spot", "unattenuated"),
         ("spot", "transmittance"),
         ("wide_spot", "maps"),
         ("point", "maps"),
@@ -128,15 +129,19 @@ def assert_same_image(page, scene, view, config=CONFIG, **tolerance):
     ],
 )
 def test_the_image_is_the_runtimes(opened, light, visibility):
-    scene, view, config = textured_room(), web_view(light), CONFIG.seen_by(visibility)
+    scene, view = textured_room(), web_view(light)
+    if visibility == "unattenuated":
+        config = with_parameters(CONFIG, extinction_coefficient=0.0)
+    else:
+        config = CONFIG.seen_by(visibility)
     assert_same_image(opened(page_text(scene, view, config)), scene, view, config)
 
 
 def test_visibility_maps_are_cast_in_the_page(opened):
-    scene, view, config = textured_room(), web_view("spot"), dataclasses.replace(CONFIG, visibility="maps")
+    scene, view, config = textured_room(), web_view("spot"), CONFIG.seen_by("maps")
     page = opened(page_text(scene, view, config))
     assert_same_image(page, scene, view, config)
-    plain = Runtime(scene, CONFIG.seen_by("transmittance"), rsm_resolution=RESOLUTION).render(view)
+    plain = Runtime(scene).render(view, CONFIG.seen_by("transmittance"))
     assert (np.abs(image_of(page) - plain).max(axis=-1) > 3).mean() > 0.1
 
 
@@ -151,8 +156,7 @@ def test_cells_shine_as_discs_in_the_page(opened, light):
     page = opened(page_text(scene, view, CELLS))
     assert_same_image(page, scene, view, CELLS, but=5e-3)
     cells = image_of(page)
-    parameters = dataclasses.replace(CELLS.parameters, lloyd_iterations=0)
-    points = opened(page_text(scene, view, dataclasses.replace(CELLS, parameters=parameters)))
+    points = opened(page_text(scene, view, with_parameters(CELLS, lloyd_iterations=0)))
     assert (np.abs(image_of(points) - cells).max(axis=-1) > 3).mean() > 0.1
 
 
@@ -178,21 +182,19 @@ def test_cells_are_the_standalone_readers(opened):
 def test_vpls_are_placed_by_what_the_camera_sees(opened, light):
     """And anew when it moves; the default, which is one click away, knows nothing of it."""
     scene, view = colored_room(), web_view(light)
-    parameters = dataclasses.replace(CONFIG.parameters, vpl_count=32, density_importance=0.7)
-    config = dataclasses.replace(CONFIG, parameters=parameters)
+    config = with_parameters(CONFIG, vpl_count=32, density_importance=0.7)
     page = opened(page_text(scene, view, config))
     assert_same_image(page, scene, view, config)
     for _ in range(4):
         page.keyboard.press("ArrowLeft")
     camera = Camera(np.array(page.evaluate("vpltune.camera")), view.camera.yfov)
     there, exposure = dataclasses.replace(view, camera=camera), page.evaluate("vpltune.exposure")
-    runtime = Runtime(scene, config, rsm_resolution=RESOLUTION)
-    assert_same(image_of(page), runtime, there, exposure)
+    runtime = Runtime(scene)
+    assert_same(image_of(page), runtime, there, config, exposure)
     page.keyboard.press("t")
-    plain = dataclasses.replace(CONFIG, parameters=dataclasses.replace(ArtistParameters(), vpl_count=32))
-    runtime = Runtime(scene, plain, rsm_resolution=RESOLUTION)
-    assert (np.abs(image_of(page) - runtime.render(view)).max(axis=-1) > 3).mean() > 0.1
-    assert_same(image_of(page), runtime, there, exposure)
+    plain = default_of(config)
+    assert (np.abs(image_of(page) - runtime.render(view, plain)).max(axis=-1) > 3).mean() > 0.1
+    assert_same(image_of(page), runtime, there, plain, exposure)
 
 
 def test_it_goes_on_being_the_runtimes_when_things_move(opened):
@@ -212,14 +214,11 @@ def test_it_goes_on_being_the_runtimes_when_things_move(opened):
     assert np.linalg.norm(light.position_world - view.lights[0].position_world) > 0.05
     there = dataclasses.replace(view, camera=camera, lights=(light,))
     exposure = page.evaluate("vpltune.exposure")
-    runtime = Runtime(scene, CONFIG, rsm_resolution=RESOLUTION)
-    assert_same(image_of(page), runtime, there, exposure)
+    runtime = Runtime(scene)
+    assert_same(image_of(page), runtime, there, CONFIG, exposure)
     page.keyboard.press("t")
     assert page.get_attribute("#default", "aria-pressed") == "true"
-    parameters = dataclasses.replace(ArtistParameters(), vpl_count=CONFIG.parameters.vpl_count)
-    plain = dataclasses.replace(CONFIG, parameters=parameters)
-    runtime = Runtime(scene, plain, rsm_resolution=RESOLUTION)
-    assert_same(image_of(page), runtime, there, exposure)
+    assert_same(image_of(page), runtime, there, default_of(CONFIG), exposure)
 
 
 def test_a_sun_turns_and_several_lights_are_chosen_among(opened):
@@ -271,16 +270,30 @@ def test_it_is_legible_in_the_dark_and_on_a_small_screen(opened, scheme):
 
 def test_names_cannot_break_out_and_what_is_left_out_is_said(opened):
     name = "</script><script>document.title='broken'</script>"
-    parameters = dataclasses.replace(CONFIG.parameters, screen_space_strength=1.0)
-    config = TunedConfig(parameters, {"scene": name})
+    config = dataclasses.replace(
+        with_parameters(CONFIG, screen_space_strength=1.0), provenance={"scene": name}
+    )
     scene = dataclasses.replace(textured_room(), name=name)
     page = opened(page_text(scene, web_view("spot", (16, 12)), config))
     assert page.title() == f"{name} – VPLtune"
     assert page.inner_text("h1") == name
     assert "near field is drawn by the runtime alone" in page.inner_text("#note")
     # Discs withhold nothing that a near field would give back.
-    cells = dataclasses.replace(parameters, lloyd_iterations=8)
-    assert left_out(TunedConfig(cells)) == ()
+    assert left_out(with_parameters(config, lloyd_iterations=8)) == ()
+
+
+def test_the_page_says_what_the_config_says(opened):
+    """Every parameter, wherever the file keeps it, how the fit ended, and where the numbers come from."""
+    config = dataclasses.replace(CELLS, fit=FitNote("kept", "as good as before"), provenance={"seed": 7})
+    page = opened(page_text(colored_room(), web_view("spot", (16, 12)), config))
+    said = page.evaluate(
+        "Object.fromEntries([...document.querySelectorAll('#provenance dt')]"
+        ".map((term) => [term.textContent, term.nextElementSibling.textContent]))"
+    )
+    expected = {name.replace("_", " "): value for name, value in config.parameters.as_dict().items()}
+    assert {name: float(said[name]) for name in expected} == expected
+    others = {"visibility": "maps", "status": "kept", "fit": "as good as before", "seed": "7"}
+    assert {name: text for name, text in said.items() if name not in expected} == others
 
 
 def test_the_command_writes_one_file(tmp_path, capfd):
@@ -305,7 +318,7 @@ def test_a_view_without_light_is_refused():
 
 def test_the_bundles_faces_and_camera_are_the_runtimes():
     scene, view = textured_room(), web_view("point", (16, 12))
-    document = scene_bundle(scene, view, CONFIG, rsm_resolution=64).document
+    document = scene_bundle(scene, view, with_resolution(CONFIG, 64)).document
     faces = light_records(view.lights, scene.bounds()).faces
     for face, theirs in zip(faces, document["rsm"]["faces"], strict=True):
         np.testing.assert_array_equal(face["light_to_world"].T, np.float32(theirs["light_to_world"]))

@@ -1,10 +1,14 @@
 """Dynamic lights: closed forms, three passes that must agree, and the number of GL calls per frame."""
 
+from dataclasses import replace
+
 import moderngl
 import numpy as np
 import pytest
 from built_scenes import colored_room, quad, room_view, scene_of
 
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import read_image
 from vpltune.renderer.frame.passes.light_volumes import (
@@ -16,7 +20,6 @@ from vpltune.renderer.frame.passes.light_volumes import (
 from vpltune.renderer.frame.passes.tiled_lights import TILE_BATCH, TiledLightsPass
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
-from vpltune.renderer.gpu.dynamic_light_buffer import DynamicLightBuffer
 from vpltune.renderer.scene.dynamic_lights import (
     DYNAMIC_LIGHT_DTYPE,
     MIN_DISTANCE,
@@ -30,6 +33,7 @@ from vpltune.renderer.scene.views import View, scaled_view
 from vpltune.renderer.techniques.light_per_draw import LightPerDrawPass
 
 WAYS = (LightPerDrawPass, LightVolumesPass, TiledLightsPass)
+CONFIG = TunedConfig()
 SIZE = (136, 72)
 """Not a whole number of tiles, and more than one cell."""
 
@@ -38,19 +42,17 @@ class Lighting:
     """A G-buffer and the three passes that can light it."""
 
     def __init__(self, context, scene, view):
-        self.context = context
-        runtime = Runtime(scene, "default", context=context, rsm_resolution=16)
-        self.captured = runtime.capture(view)
-        frame = runtime._draw(view)
-        self.camera = frame.camera(view)
-        self.passes = {way.__name__: way(context, frame.gbuffer) for way in WAYS}
-        self.buffer = DynamicLightBuffer(context)
+        config = TunedConfig(ArtistParameters(vpl_count=1), quality=Quality(rsm_resolution=64))
+        drawn = Runtime(scene, context=context).draw(view, config)
+        self.captured, self.inputs = drawn.capture(), drawn.inputs
+        self.resources = drawn.frame.resources.child()
+        self.passes = {way.__name__: way(self.resources) for way in WAYS}
 
     def irradiance(self, records, way="TiledLightsPass"):
         lights = DynamicLights(records)
-        self.buffer.upload(lights)
-        self.passes[way].draw(self.camera, lights)
-        stored = read_image(self.passes[way].light_accumulation)[..., :3]
+        self.resources["dynamic_lights"] = self.resources.context.buffer(lights.numbers)
+        self.passes[way].draw(replace(self.inputs, dynamic_lights=lights))
+        stored = read_image(self.resources, self.passes[way].accumulation)[..., :3]
         return stored.astype(np.float32) * np.float32(lights.accumulation_unit)
 
 
@@ -188,11 +190,9 @@ def test_scale_changes_nothing(gl_context, path, factor):
     view, records = room_view("spot"), random_lights(200, seed=5)
     images = []
     for scale in (1.0, factor):
-        runtime = Runtime(
-            scaled(colored_room(), scale), "default", RuntimeOptions(light_path=path), context=gl_context
-        )
+        runtime = Runtime(scaled(colored_room(), scale), RuntimeOptions(light_path=path), context=gl_context)
         lights = DynamicLights(scaled_records(records, scale))
-        images.append(runtime.render_radiance(scaled_view(view, scale), lights))
+        images.append(runtime.render_radiance(scaled_view(view, scale), CONFIG, lights=lights))
     error = np.sqrt(np.mean((images[1] - images[0]) ** 2) / np.mean(images[0] ** 2))
     assert error < 1e-3
 
@@ -200,9 +200,10 @@ def test_scale_changes_nothing(gl_context, path, factor):
 @pytest.mark.parametrize("path", ["auto", "volumes", "tiles"])
 def test_the_frame_adds_them_to_the_direct_light(gl_context, path):
     """Direct irradiance grows by what the lights give. Indirect irradiance does not change."""
-    runtime = Runtime(colored_room(), "default", RuntimeOptions(light_path=path), context=gl_context)
+    runtime = Runtime(colored_room(), RuntimeOptions(light_path=path), context=gl_context)
     view, records = room_view("spot"), random_lights(50, seed=6)
-    without, with_lights = runtime.capture(view), runtime.capture(view, lights=DynamicLights(records))
+    without = runtime.capture(view, CONFIG)
+    with_lights = runtime.capture(view, CONFIG, lights=DynamicLights(records))
     expected = sum(expected_irradiance(without, record) for record in records)
     np.testing.assert_allclose(
         with_lights.direct_irradiance - without.direct_irradiance,
@@ -211,23 +212,23 @@ def test_the_frame_adds_them_to_the_direct_light(gl_context, path):
         atol=1e-3 * float(without.direct_irradiance.max()),
     )
     np.testing.assert_array_equal(with_lights.indirect_irradiance, without.indirect_irradiance)
-    dark = runtime.capture(view, lights=DynamicLights(records[:0]))
+    dark = runtime.capture(view, CONFIG, lights=DynamicLights(records[:0]))
     np.testing.assert_array_equal(dark.direct_irradiance, without.direct_irradiance)
 
 
 def test_auto_measures_both_ways_once(gl_context):
     """The faster of the two timed passes is chosen and kept, so frames repeat bitwise."""
-    runtime = Runtime(colored_room(), "default", context=gl_context)
+    runtime = Runtime(colored_room(), context=gl_context)
     view, lights = room_view("spot"), DynamicLights(random_lights(60, seed=7))
-    first = runtime.capture(view, lights=lights).direct_irradiance
-    pre_pass = runtime._draw(view, lights=lights).light_pre_pass
+    first = runtime.capture(view, CONFIG, lights=lights).direct_irradiance
+    drawn = runtime.draw(view, CONFIG, lights=lights)
+    pre_pass = drawn.frame.light_pre_pass
     assert set(pre_pass.milliseconds) == {6}
     measured = pre_pass.milliseconds[6]
     assert set(measured) == {"volumes", "tiles"}
     assert min(measured.values()) > 0.0
-    camera = runtime._draw(view).camera(view)
-    assert pre_pass.path(camera, lights) == min(measured, key=measured.get)
-    np.testing.assert_array_equal(runtime.capture(view, lights=lights).direct_irradiance, first)
+    assert pre_pass.path(drawn.inputs) == min(measured, key=measured.get)
+    np.testing.assert_array_equal(runtime.capture(view, CONFIG, lights=lights).direct_irradiance, first)
 
 
 @pytest.mark.parametrize("path", ["volumes", "tiles"])
@@ -244,18 +245,18 @@ def test_a_thousand_lights_take_few_calls(gl_context, monkeypatch, path):
 
         monkeypatch.setattr(owner, name, call)
 
-    runtime = Runtime(colored_room(), "default", RuntimeOptions(light_path=path), context=gl_context)
+    runtime = Runtime(colored_room(), RuntimeOptions(light_path=path), context=gl_context)
     view, lights = room_view("spot"), DynamicLights(random_lights(1000, seed=8))
-    runtime.draw(view, lights=lights)
+    runtime.draw(view, CONFIG, lights=lights)
     for name in ("render", "render_indirect"):
         counted(moderngl.VertexArray, name, "draw")
     for name in ("run", "run_indirect"):
         counted(moderngl.ComputeShader, name, "draw")
     counted(moderngl.Buffer, "write", "write")
-    runtime.draw(view)
+    runtime.draw(view, CONFIG)
     plain = dict(calls)
     assert plain["draw"] > 4
-    runtime.draw(view, lights=lights)
+    runtime.draw(view, CONFIG, lights=lights)
     assert 1 <= calls["draw"] - 2 * plain["draw"] <= 4
     assert calls["write"] - 2 * plain["write"] == 1
 
@@ -352,7 +353,7 @@ def test_lights_that_touch_a_floor_stay_finite(gl_context):
     floor = scene_of([quad((-1, 0, -1), (0, 0, 2), (2, 0, 0))], [(0.5, 0.5, 0.5)])
     camera = Camera(look_at(np.array([0.0, 2.0, 0.0]), np.zeros(3)), 0.9)
     for path in ("volumes", "tiles"):
-        runtime = Runtime(floor, TunedConfig(), RuntimeOptions(light_path=path), context=gl_context)
+        runtime = Runtime(floor, RuntimeOptions(light_path=path), context=gl_context)
         view = View("floor", "fitted", (33, 33), camera, ())
         lights = DynamicLights(point_lights(np.repeat([[0.0, 1e-5, 0.0]], 50, axis=0), np.full(3, 1e6), 2.0))
-        assert np.isfinite(runtime.render_radiance(view, lights)).all()
+        assert np.isfinite(runtime.render_radiance(view, CONFIG, lights=lights)).all()

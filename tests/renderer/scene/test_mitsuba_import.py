@@ -11,6 +11,7 @@ from PIL import Image
 from vpltune import Runtime
 from vpltune.__main__ import run
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.files import read_scene
@@ -100,8 +101,11 @@ def test_mitsuba_sees_the_same_surfaces_and_colours(tmp_path, version):
     assert run(["import", str(path), "-o", str(tmp_path / "scene.glb")]) == 0
     scene = read_scene(tmp_path / "scene.glb")
     view = View("main", "fitted", SIZE, scene.cameras[0], ())
-    runtime = Runtime(scene, TunedConfig(ArtistParameters(vpl_count=1)), rsm_resolution=64)
-    depth, albedo, normal = (runtime.render(view, layer) for layer in ("depth", "albedo", "normal"))
+    runtime = Runtime(scene)
+    config = TunedConfig(ArtistParameters(vpl_count=1), quality=Quality(rsm_resolution=64))
+    depth, albedo, normal = (
+        runtime.render(view, config, layer=layer) for layer in ("depth", "albedo", "normal")
+    )
     their_depth, their_albedo, their_normal = _mitsuba_layers(path, view)
     seen = their_depth > 0.0
     assert (seen == (depth > 0.0)).mean() > 0.99

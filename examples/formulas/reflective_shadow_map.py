@@ -21,7 +21,7 @@ class RsmTexels:
     position: np.ndarray
     normal: np.ndarray
     area: np.ndarray
-    """Of the surface [world units²]."""
+    """Area of the surface [world units²]."""
 
     @property
     def mean_flux(self) -> np.ndarray:

@@ -48,7 +48,7 @@ def disc_form(position, normal, vpls: Vpls, alpha: float, scene_length: float) -
 
 
 def disc_past_chord(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of a unit disc, the part past a chord at distance t before its middle: its area share, its centroid."""
+    """The part of a unit disc past a chord at distance t before its middle: its area share, its centroid."""
     a = np.minimum(np.abs(t), 1.0 - 1e-6)
     half_chord = np.sqrt(1.0 - a * a)
     # arccos a (Abramowitz and Stegun 1964, 4.4.45).

@@ -56,7 +56,7 @@ def test_flux_is_the_sum(captured, names):
 
 
 def test_vpls_are_shared_out_by_flux(captured):
-    """Of two lights, each gets VPLs in proportion to its flux, to a few of 4,096: the table is stratified.
+    """Each of two lights gets VPLs in proportion to its flux, to a few of 4,096: the table is stratified.
 
     The directional light comes from outside, where no point light's VPL is: on faces that look outwards.
     """

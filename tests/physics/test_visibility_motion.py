@@ -11,7 +11,7 @@ from vpltune.renderer.frame.runtime import Runtime
 
 FRAMES = 16
 STEP = 0.03
-"""Of a room that is 2 wide: as fast as a hand carries a thing at 60 frames a second."""
+"""In a room that is 2 wide: as fast as a hand carries a thing at 60 frames a second."""
 PARAMETERS = ArtistParameters(vpl_count=256)
 
 

@@ -24,7 +24,7 @@ class RecordingContext(moderngl.Context):
 
 
 class RecordingBuffer(moderngl.Buffer):
-    """Of some bytes, which are zero."""
+    """A buffer of zeros."""
 
     def __init__(self, context: RecordingContext, size: int = 16):
         self.context = context

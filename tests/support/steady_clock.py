@@ -8,7 +8,7 @@ from vpltune.renderer.frame.runtime import Runtime
 
 
 def pass_times(config: TunedConfig) -> dict[str, float]:
-    """Of a machine that draws 0.05 ms a VPL, less where pixels share them out."""
+    """Frame times of a machine that draws 0.05 ms a VPL, less where pixels share them out."""
     count, interleave = config.parameters.vpl_count, config.quality.interleave
     resolution = config.quality.rsm_resolution or 1024
     passes = {

@@ -40,7 +40,7 @@ def test_against_a_black_reference_there_is_no_value(image):
 
 
 def test_without_the_worst_pixel_in_a_thousand():
-    """Of 2,000 pixels, two are off by a factor of 11, the others by 1 %: the two cause 99.9 % of relMSE."""
+    """Two of 2,000 pixels are off by a factor of 11, the others by 1 %: the two cause 99.9 % of relMSE."""
     reference = np.ones((2000, 3), np.float32)
     image = 1.01 * reference
     image[[7, 1234]] = 11.0

@@ -17,7 +17,7 @@ from vpltune.renderer.scene.scene import Camera, Light, Scene
 REPOSITORY = Path(__file__).resolve().parents[2]
 VECTORS: dict[str, Any] = json.loads((REPOSITORY / "docs" / "test_vectors.json").read_text(encoding="utf-8"))
 BOUNDS = np.array(VECTORS["faces"][0]["bounds"], np.float64)
-"""The test vectors of the boxes."""
+"""Bounds of the scene of boxes."""
 DIAGONAL = float(np.linalg.norm(BOUNDS[1] - BOUNDS[0]))
 PI = "const float PI = 3.14159265358979;"
 

@@ -17,8 +17,8 @@ SPREAD = 16.0
 """Area over which a cell's light is spread, in areas of a cell: about that of one of a few hundred VPLs. At a
 quarter and at four times it, the error of 32 VPLs was the same within its noise."""
 DARK_SHARE = 0.01
-"""Share of the squared mean irradiance that is added to a receiver's own, as in relMSE: a black point is not
-infinitely important."""
+"""Share of the mean squared irradiance that is added to a receiver's own: a black point is not infinitely
+important."""
 LEAST_IMPORTANCE = 0.05
 """Share of the mean importance of lit cells that is added to each. Light that seems to matter little is drawn
 seldom, but never not at all, so that the mean stays right and no VPL grows too bright."""

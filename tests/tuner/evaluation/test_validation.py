@@ -24,7 +24,7 @@ ROTATIONS = ((0.0, 0.0), (0.3, 0.6))
 def test_metrics_are_those_of_drawn_images(gl_context):
     """Means over rotations and over lit views alone, to the bit; a shared placement changes nothing."""
     runtime = Runtime(colored_room(), context=gl_context)
-    lit = converged_view(runtime, START, "spot")
+    lit = converged_view(runtime, "spot", START)
     dark = View("dark", "validation", lit.view.size, lit.view.camera, ())
     black = replace(
         lit.reference,
@@ -54,7 +54,7 @@ def test_metrics_are_those_of_drawn_images(gl_context):
 def test_candidates_of_one_quality_alone_share_vpls(gl_context):
     """Another quality draws other maps: that is refused, and not passed over."""
     runtime = Runtime(colored_room(), context=gl_context)
-    lit = converged_view(runtime, START, "spot")
+    lit = converged_view(runtime, "spot", START)
     configs = {"start": START, "finer": replace(START, quality=Quality(rsm_resolution=128))}
     with pytest.raises(ValueError, match="capture_variants: configs must be one or more with one placement"):
         validation_metrics(runtime, ((lit.view, lit.reference),), configs, ROTATIONS[:1])

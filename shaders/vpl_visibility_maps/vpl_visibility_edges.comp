@@ -31,7 +31,10 @@ void main() {
     barrier();
     float farthest = VISIBILITY_FARTHEST * longest / scene_length;
     for (int i = int(gl_LocalInvocationIndex); i < TEXELS; i += 64) {
-        if (!is_silhouette(ivec2(i % VISIBILITY_MAP_SIZE, i / VISIBILITY_MAP_SIZE), farthest)) {
+        ivec2 texel = ivec2(i % VISIBILITY_MAP_SIZE, i / VISIBILITY_MAP_SIZE);
+        visibility_maps[start + i].x |= corner_mark(texel, farthest);
+#if VISIBILITY_BLOCKS > 0
+        if (!is_silhouette(texel, farthest)) {
             continue;
         }
         uint block = atomicAdd(visibility_edge_count, 1u);
@@ -41,5 +44,6 @@ void main() {
             uint groups = ((block + 1u) * uint(VISIBILITY_BLOCK_TEXELS) + 63u) / 64u;
             atomicMax(visibility_edge_groups[0], min(groups, uint(MOST_WORKGROUPS)));
         }
+#endif
     }
 }

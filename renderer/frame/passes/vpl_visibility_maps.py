@@ -42,9 +42,6 @@ class VplVisibilityMapsPass(FramePass):
             reads=(*_CAST_READS, "visibility_details"),
             writes=("visibility_maps",),
         )
-        self._refines = blocks > 0
-        if not self._refines:
-            return
         self._edges = ComputeProgram(
             resources,
             "vpl_visibility_maps/vpl_visibility_edges",
@@ -52,6 +49,9 @@ class VplVisibilityMapsPass(FramePass):
             reads=("frame_statistics", "visibility_details"),
             writes=("visibility_maps", "visibility_edges"),
         )
+        self._refines = blocks > 0
+        if not self._refines:
+            return
         self._details = ComputeProgram(
             resources,
             "vpl_visibility_maps/vpl_visibility_details",
@@ -67,7 +67,7 @@ class VplVisibilityMapsPass(FramePass):
         groups = (columns, -(-self._vpl_count // columns))
         uniforms = {"longest": inputs.scene_diagonal, "vpl_count": self._vpl_count}
         self._maps.dispatch(*groups, **uniforms)
+        self._resources.write("visibility_edges", EMPTY_DISPATCH)
+        self._edges.dispatch(*groups, **uniforms)
         if self._refines:
-            self._resources.write("visibility_edges", EMPTY_DISPATCH)
-            self._edges.dispatch(*groups, **uniforms)
             self._details.dispatch_indirect("visibility_edges", longest=inputs.scene_diagonal)

@@ -31,39 +31,38 @@ bool is_silhouette(ivec2 texel, float farthest) {
     return false;
 }
 
-// Whether a texel's ray and a neighbour's hit the two sides of a concave corner.
-bool meets_in_corner(MetSurface own, ivec2 beside, float farthest) {
-    if (any(lessThan(beside, ivec2(0))) || any(greaterThanEqual(beside, ivec2(VISIBILITY_MAP_SIZE)))) {
-        return false;
-    }
-    MetSurface other = met_surface(SILHOUETTE_ENTRY(beside), beside, VISIBILITY_MAP_SIZE);
-    return length(other.end) < farthest && is_concave(own, other, VISIBILITY_ROUNDING * length(own.end));
+// A choice: two planes at 8° or more are two sides of a corner.
+const float CORNER_COSINE = 0.99;
+
+// Whether two hits are on two sides of a concave corner.
+bool is_corner(MetSurface met, MetSurface other) {
+    return dot(met.normal, other.normal) < CORNER_COSINE && are_joined(met, other);
 }
 
 // The corner mark of a texel.
 uint corner_mark(ivec2 texel, float farthest) {
     MetSurface own = met_surface(SILHOUETTE_ENTRY(texel), texel, VISIBILITY_MAP_SIZE);
-    uint mark = 0u;
     if (!(length(own.end) < farthest)) {
-        return mark;
+        return 0u;
     }
+    uint mark = 0u;
     for (uint vertex = 0u; vertex < 4u; ++vertex) {
-        ivec2 toward = ivec2((vertex & 1u) != 0u ? 1 : -1, (vertex & 2u) != 0u ? 1 : -1);
+        ivec2 beyond = texel + ivec2((vertex & 1u) != 0u ? 1 : -1, (vertex & 2u) != 0u ? 1 : -1);
         MetSurface first = own;
-        bool found = false;
         for (int i = 1; i < 4; ++i) {
-            ivec2 beside = texel + ivec2((i & 1) != 0 ? toward.x : 0, (i & 2) != 0 ? toward.y : 0);
-            if (!meets_in_corner(own, beside, farthest)) {
+            ivec2 beside = ivec2((i & 1) != 0 ? beyond.x : texel.x, (i & 2) != 0 ? beyond.y : texel.y);
+            if (any(lessThan(beside, ivec2(0))) || any(greaterThanEqual(beside, ivec2(VISIBILITY_MAP_SIZE)))) {
                 continue;
             }
             MetSurface other = met_surface(SILHOUETTE_ENTRY(beside), beside, VISIBILITY_MAP_SIZE);
-            if (!found) {
-                found = true;
-                first = other;
-                mark = max(mark, VISIBILITY_NEAREST_VERTEX);
-            } else if (is_concave(first, other, VISIBILITY_ROUNDING * length(own.end))) {
+            if (!(length(other.end) < farthest && is_corner(own, other))) {
+                continue;
+            }
+            if (is_corner(first, other) && first != own) {
                 mark = VISIBILITY_FIRST_VERTEX + vertex;
             }
+            first = other;
+            mark = max(mark, VISIBILITY_NEAREST_VERTEX);
         }
     }
     return mark;

@@ -81,7 +81,10 @@ MetSurface met_surface(uvec2 entry, ivec2 texel, int size) {
         visibility_axis(texel, size) * uintBitsToFloat(entry.x), octahedral_decode(unpackUnorm2x16(entry.y)));
 }
 
-// What a map holds at a place, in units of its finest texels.
+// The finest texels along the side of a map: places on it are counted in them.
+const int VISIBILITY_FINEST = VISIBILITY_MAP_SIZE * VISIBILITY_MAP_REFINEMENT;
+
+// What a map holds at a place.
 struct MapTexel {
     MetSurface met;
     int side;     // of the texel, in finest texels
@@ -122,15 +125,28 @@ float rim_overlap(MetSurface met, vec3 receiver, vec3 receiver_normal) {
         * inversesqrt(dot(receiver, receiver));
 }
 
-// Whether each of two hits lies in front of the other's plane, by more than `height` [L].
-bool is_concave(MetSurface met, MetSurface other, float height) {
+// Whether two hits lie in one plane or on the two sides of a concave corner: neither is behind the plane of the other,
+// but for rounding.
+bool are_joined(MetSurface met, MetSurface other) {
     vec3 apart = met.end - other.end;
-    return dot(apart, other.normal) > height && dot(apart, met.normal) < -height;
+    float rounding = VISIBILITY_ROUNDING * length(met.end);
+    return dot(apart, other.normal) > -rounding && dot(apart, met.normal) < rounding;
 }
 
-// The overlap of a receiver with the surfaces of the texels around its own that form concave corners with the own one,
-// or lie in its plane. Between two rays on either side of a corner, the nearer of the two planes is in sight.
-float corner_overlap(MapTexel own, vec2 place, int map_start, vec3 receiver, vec3 receiver_normal, bool facing) {
+// The overlap of a receiver with a surface that reaches as far as the receiver's direction, because a corner does: the
+// height of the receiver behind the surface's plane, if the hit is in front of the receiver's tangent plane at all.
+float corner_overlap(MetSurface met, vec3 receiver, vec3 receiver_normal) {
+    if (!(dot(receiver, receiver_normal) < 0.0)) {
+        return rim_overlap(met, receiver, receiver_normal);
+    }
+    vec3 between = met.end - receiver;
+    float share = inversesqrt(dot(receiver, receiver));
+    return dot(between, receiver_normal) * share > VISIBILITY_ROUNDING ? dot(between, met.normal) * share : -1.0;
+}
+
+// The overlap of a receiver with its own texel's surface and those of three texels around it that are joined to that.
+// Between two rays on either side of a concave corner, the nearer of the two planes is in sight.
+float joined_overlap(MapTexel own, vec2 place, int map_start, vec3 receiver, vec3 receiver_normal) {
     ivec2 inside = ivec2(place), start = inside / own.side * own.side;
     bvec2 beyond = greaterThanEqual(2.0 * place, vec2(2 * start + own.side));
     if (own.corner >= VISIBILITY_FIRST_VERTEX) {
@@ -138,27 +154,18 @@ float corner_overlap(MapTexel own, vec2 place, int map_start, vec3 receiver, vec
         beyond = bvec2((vertex & 1u) != 0u, (vertex & 2u) != 0u);
     }
     ivec2 beside = ivec2(beyond.x ? start.x + own.side : start.x - 1, beyond.y ? start.y + own.side : start.y - 1);
-    float own_rounding = VISIBILITY_ROUNDING * length(own.met.end);
-    float distance_in_l = length(receiver);
-    float most = -1.0;
+    float overlap = corner_overlap(own.met, receiver, receiver_normal);
     for (int i = 1; i < 4; ++i) {
-        ivec2 other_place = ivec2((i & 1) != 0 ? beside.x : inside.x, (i & 2) != 0 ? beside.y : inside.y);
-        if (any(lessThan(other_place, ivec2(0)))
-            || any(greaterThanEqual(other_place, ivec2(VISIBILITY_MAP_SIZE * VISIBILITY_MAP_REFINEMENT)))) {
+        ivec2 around = ivec2((i & 1) != 0 ? beside.x : inside.x, (i & 2) != 0 ? beside.y : inside.y);
+        if (any(lessThan(around, ivec2(0))) || any(greaterThanEqual(around, ivec2(VISIBILITY_FINEST)))) {
             continue;
         }
-        MetSurface other = map_texel(other_place, map_start).met;
-        if (!is_concave(own.met, other, -own_rounding)) {
-            continue;
-        }
-        vec3 between = other.end - receiver;
-        if (!facing) {
-            most = max(most, rim_overlap(other, receiver, receiver_normal));
-        } else if (dot(between, receiver_normal) > VISIBILITY_ROUNDING * distance_in_l) {
-            most = max(most, dot(between, other.normal) / distance_in_l);
+        MetSurface other = map_texel(around, map_start).met;
+        if (are_joined(own.met, other)) {
+            overlap = max(overlap, corner_overlap(other, receiver, receiver_normal));
         }
     }
-    return most;
+    return overlap;
 }
 
 // Share of a VPL's light that reaches a receiver, in [0, 1], from one lookup. Texels are not interpolated: many VPLs
@@ -175,14 +182,13 @@ float vpl_visibility(
     if (!(to_receiver.z > 0.0)) {
         return 1.0;
     }
-    const int finest = VISIBILITY_MAP_SIZE * VISIBILITY_MAP_REFINEMENT;
-    vec2 place = (hemi_octahedral_encode(to_receiver) * 0.5 + 0.5) * float(finest);
-    place = min(place, vec2(finest) - 0.5);
+    vec2 place = (hemi_octahedral_encode(to_receiver) * 0.5 + 0.5) * float(VISIBILITY_FINEST);
+    place = min(place, vec2(float(VISIBILITY_FINEST) - 0.5));
     MapTexel own = map_texel(ivec2(place), map_start);
     bool facing = dot(to_receiver, normal) < 0.0;
     float overlap = facing ? surface_overlap(own.met, to_receiver, normal) : rim_overlap(own.met, to_receiver, normal);
     if (own.corner != 0u && overlap < parameters.bias + parameters.softness) {
-        overlap = max(overlap, corner_overlap(own, place, map_start, to_receiver, normal, facing));
+        overlap = max(overlap, joined_overlap(own, place, map_start, to_receiver, normal));
     }
     return 1.0 - clamp((overlap - parameters.bias) / parameters.softness, 0.0, 1.0);
 }

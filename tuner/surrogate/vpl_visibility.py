@@ -215,19 +215,24 @@ class _Lookup:
         def rim(other: Array, other_normal: Array) -> Array:
             return jnp.minimum(_dot(other - receiver, other_normal), _dot(other - cut, other_normal))
 
+        def corner(other: Array, other_normal: Array) -> Array:
+            between = other - receiver
+            reaches = _dot(between, normal) > _ROUNDING * distance
+            hidden = jnp.where(reaches, _dot(between, other_normal), -distance)
+            return jnp.where(away < 0.0, hidden, rim(other, other_normal))
+
         before, behind = _dot(end - receiver, normal), _dot(end - receiver, met_normal)
         overlap = jnp.where(away < 0.0, jnp.minimum(before, behind), rim(end, met_normal))
+        marked = self._corner[coarse] > 0
+        overlap = jnp.where(marked, jnp.maximum(overlap, corner(end, met_normal)), overlap)
         rounding = _ROUNDING * jnp.linalg.norm(end, axis=-1)
         for other_place in self._around(place, own_place, coarse):
             inside = ((other_place >= 0) & (other_place < self._finest)).all(-1)
             _, other, other_normal = self._met(jnp.clip(other_place, 0, self._finest - 1))
             apart = end - other
             joined = (_dot(apart, other_normal) > -rounding) & (_dot(apart, met_normal) < rounding)
-            before = _dot(other - receiver, normal) > _ROUNDING * distance
-            hidden = jnp.where(before, _dot(other - receiver, other_normal), -1.0)
-            hidden = jnp.where(away < 0.0, hidden, rim(other, other_normal))
-            counts = inside & joined & (self._corner[coarse] > 0)
-            overlap = jnp.where(counts, jnp.maximum(overlap, hidden), overlap)
+            counts = inside & joined & marked
+            overlap = jnp.where(counts, jnp.maximum(overlap, corner(other, other_normal)), overlap)
         return overlap / distance
 
     def _met(self, place: Array) -> tuple[Array, Array, Array]:

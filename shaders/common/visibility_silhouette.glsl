@@ -1,8 +1,9 @@
 // Silhouettes in a visibility map. One runs through a texel if the surface that its ray hit shades the surface that a
 // neighbour's ray hit, or the other way round. There, one ray says too little. The corner of a room, or the edge of a
-// box that faces the VPL, hides nothing and is no silhouette.
+// box that faces the VPL, hides nothing and is no silhouette. A concave corner, such as a room's or a wall's foot, hides
+// what is behind it: no texel is finer for it, but it is marked.
 //
-// Provides: `is_silhouette`. The including file defines SILHOUETTE_ENTRY(texel), which reads a map's entry.
+// Provides: `is_silhouette`, `corner_mark`. The including file defines SILHOUETTE_ENTRY(texel), which reads a map's entry.
 #include "common/vpl_visibility.glsl"
 
 // A choice: the overlap beyond which one surface hides another, as a share of the distance. It is four times the

@@ -1,8 +1,8 @@
 // Visibility of a VPL from its visibility map: a small hemispherical map of the surfaces that the VPL sees.
 //
 // Provides: reading and writing of a map's entries, and `vpl_visibility`. Needs common/virtual_point_lights.glsl.
-// Constants: VISIBILITY_MAP_SIZE, VISIBILITY_MAP_REFINEMENT, VISIBILITY_LIFT [footprints] and VISIBILITY_LEAST_LIFT [L]
-// of renderer/frame/visibility_map_layout.py.
+// Constants: VISIBILITY_MAP_SIZE, VISIBILITY_MAP_REFINEMENT, VISIBILITY_LIFT [footprints], VISIBILITY_LEAST_LIFT [L],
+// VISIBILITY_ROUNDING [share of the distance] and those of the corner mark, of renderer/frame/visibility_map_layout.py.
 // Twin: tuner/surrogate/vpl_visibility.py. Imperfect shadow maps (Ritschel et al. 2008) hold the same, but as depths.
 #include "common/hemi_octahedral.glsl"
 #include "common/octahedral.glsl"
@@ -11,7 +11,11 @@
 // bits of a float, and that surface's normal on the VPL's side, in the VPL's frame, octahedral in 2 × 16 bits. If the
 // sign bit of the first word is set, a silhouette runs through the texel. Then the second word is the index of a block
 // in visibility_details [blocks, refinement, refinement], which holds entries of the same form for finer rays. The
-// lowest bits of the first word are the texel's corner mark: VISIBILITY_CORNER_BITS.
+// lowest bits of the first word are the texel's corner mark, 0 for none. A concave corner of two surfaces may run through
+// a marked texel, so a receiver must not lie behind the surface of a neighbouring texel either. The neighbours are three,
+// across a side, another side and the vertex between them. With VISIBILITY_NEAREST_VERTEX, they are those nearest to the
+// receiver's direction; else those across the vertex number mark − VISIBILITY_FIRST_VERTEX, which lies beyond the texel
+// in x if bit 0 is set, in y if bit 1 is set.
 #ifndef VISIBILITY_MAP_ENTRY  // WebGL has no storage buffers: web/visibility_atlas.glsl defines its own
 layout(std430, binding = VISIBILITY_MAPS_BINDING) buffer VisibilityMaps {
     uvec2 visibility_maps[];
@@ -26,16 +30,6 @@ layout(std430, binding = VISIBILITY_DETAILS_BINDING) buffer VisibilityDetails {
 
 // The sign bit of a float: distances are never negative.
 const uint VISIBILITY_BLOCK_BIT = 0x80000000u;
-// The corner mark, in the last bits of a distance, which then is off by 1e-6 of itself. A concave corner of two surfaces
-// may run through a marked texel, so a receiver must not lie behind the surface of a neighbouring texel either. The
-// neighbours are three, across a side, another side and the vertex between them:
-//   1      those nearest to the receiver's direction,
-//   2 … 5  those across vertex (mark − 2): beyond the texel in x if bit 0 is set, in y if bit 1 is set.
-const uint VISIBILITY_CORNER_BITS = 7u;
-const uint VISIBILITY_NEAREST_VERTEX = 1u;
-const uint VISIBILITY_FIRST_VERTEX = 2u;
-// A choice: rounding of positions and of 16-bit normals moves a point by less, as a share of the distance.
-const float VISIBILITY_ROUNDING = 1e-4;
 // A choice: a ray that hits nothing is stored as a wall that faces the VPL, this many diagonals of the scene away. Any
 // number above 1 lies behind every receiver.
 const float VISIBILITY_NOTHING = 2.0;
@@ -168,8 +162,8 @@ float joined_overlap(MapTexel own, vec2 place, int map_start, vec3 receiver, vec
     return overlap;
 }
 
-// Share of a VPL's light that reaches a receiver, in [0, 1], from one lookup. Texels are not interpolated: many VPLs
-// average out, and a finer map is better than four lookups at the same cost.
+// Share of a VPL's light that reaches a receiver, in [0, 1], from one lookup, or four at a concave corner. Texels are not
+// interpolated: many VPLs average out, and a finer map is better than four lookups at the same cost.
 float vpl_visibility(
     vec3 position_world, vec3 normal_world, VirtualPointLight vpl, int map_start, float scene_length,
     VisibilityParameters parameters

@@ -1,5 +1,5 @@
-// Visibility maps, part 2: finds the texels at silhouettes, lists them, and writes the indices of their blocks into the
-// maps. One workgroup for each VPL.
+// Visibility maps, part 2: marks the texels at concave corners, finds those at silhouettes, lists them, and writes the
+// indices of their blocks into the maps. One workgroup for each VPL.
 //
 // Reads and writes: `visibility_maps`. Writes: the list of texels.
 // Constants: VISIBILITY_BLOCKS, the number of blocks that there is room for. Further silhouettes stay coarse.

@@ -12,18 +12,16 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.frame.capture import CapturedFrame, VisibilityMaps
 from vpltune.renderer.frame.visibility_map_layout import (
     FRAME_TURNS_OVER,
+    VISIBILITY_FIRST_VERTEX,
     VISIBILITY_LEAST_LIFT,
     VISIBILITY_LIFT,
+    VISIBILITY_ROUNDING,
 )
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
 
 CHUNK = 128
 """Receivers in one chunk. A choice: with 1,024 VPLs, one value for each pair takes half a MiB."""
 _Vectors = Float[Array, "receivers vpls 3"]
-_ROUNDING = 1e-4
-"""Twin: VISIBILITY_ROUNDING in GLSL."""
-_FIRST_VERTEX = 2
-"""Twin: VISIBILITY_FIRST_VERTEX in GLSL."""
 _PADDINGS = 4
 """The fine texels are padded in steps of 1/`_PADDINGS` of the number of coarse texels. A choice."""
 
@@ -54,7 +52,7 @@ class MapTexels:
     normal: Float[Array, "texels 3"]
     """Normal of the surface that the ray hit."""
     corner: Int[Array, "vpls size size"]
-    """Corner marks: VISIBILITY_CORNER_BITS in GLSL."""
+    """Corner marks, 0 for none: shaders/common/vpl_visibility.glsl."""
     block_start: Int[Array, "vpls size size"]
     """Index of the first fine texel in the block of this coarse texel; -1 if it has none."""
     refinement: int = field(metadata={"static": True})
@@ -217,7 +215,7 @@ class _Lookup:
 
         def corner(other: Array, other_normal: Array) -> Array:
             between = other - receiver
-            reaches = _dot(between, normal) > _ROUNDING * distance
+            reaches = _dot(between, normal) > VISIBILITY_ROUNDING * distance
             hidden = jnp.where(reaches, _dot(between, other_normal), -distance)
             return jnp.where(away < 0.0, hidden, rim(other, other_normal))
 
@@ -225,7 +223,7 @@ class _Lookup:
         overlap = jnp.where(away < 0.0, jnp.minimum(before, behind), rim(end, met_normal))
         marked = self._corner[coarse] > 0
         overlap = jnp.where(marked, jnp.maximum(overlap, corner(end, met_normal)), overlap)
-        rounding = _ROUNDING * jnp.linalg.norm(end, axis=-1)
+        rounding = VISIBILITY_ROUNDING * jnp.linalg.norm(end, axis=-1)
         for other_place in self._around(place, own_place, coarse):
             inside = ((other_place >= 0) & (other_place < self._finest)).all(-1)
             _, other, other_normal = self._met(jnp.clip(other_place, 0, self._finest - 1))
@@ -248,9 +246,9 @@ class _Lookup:
         """Places in three texels around the own one: across a side, another side, and the vertex between."""
         side = jnp.where(self._block_start[coarse] >= 0, 1, self._refinement)[..., None]
         start = own_place // side * side
-        mark = self._corner[coarse]
-        vertex = jnp.stack([(mark - _FIRST_VERTEX) & 1, (mark - _FIRST_VERTEX) >> 1], axis=-1) > 0
-        beyond = jnp.where((mark >= _FIRST_VERTEX)[..., None], vertex, 2.0 * place >= 2 * start + side)
+        vertex = self._corner[coarse][..., None] - VISIBILITY_FIRST_VERTEX
+        across = jnp.concatenate([vertex & 1, vertex >> 1], axis=-1) > 0
+        beyond = jnp.where(vertex >= 0, across, 2.0 * place >= 2 * start + side)
         beside = jnp.where(beyond, start + side, start - 1)
         return [
             jnp.stack([(beside if x else own_place)[..., 0], (beside if y else own_place)[..., 1]], axis=-1)

@@ -49,8 +49,8 @@ _IMPORTANCE_SHADERS = (
     "web/vpl_importance.frag",
     "web/vpl_importance_mean.frag",
 )
-_MAP_SHADERS = ("web/vpl_visibility_maps.frag",)
-_DETAIL_SHADERS = ("web/vpl_visibility_edges.frag", "web/vpl_visibility_details.frag")
+_MAP_SHADERS = ("web/vpl_visibility_maps.frag", "web/vpl_visibility_edges.frag")
+_DETAIL_SHADERS = ("web/vpl_visibility_details.frag",)
 _HEADER = """#version 300 es
 precision highp float;
 precision highp int;

@@ -38,9 +38,9 @@ float overlap(vec3 end, vec3 plane, vec3 hidden, vec3 hidden_normal) {
     return min(dot(end - hidden, hidden_normal), dot(end - hidden, plane)) / length(hidden);
 }
 
-// Whether two hits lie in one plane or on the two sides of a concave corner.
-bool joined(vec3 end, vec3 plane, vec3 other, vec3 other_plane) {
-    return dot(end - other, other_plane) > -1e-4 * length(end) && dot(end - other, plane) < 1e-4 * length(end);
+// Whether a hit lies behind the plane of another one, by more than rounding.
+bool is_behind(vec3 end, vec3 other, vec3 plane) {
+    return dot(end - other, plane) < -1e-4 * (length(end) + length(other));
 }
 #endif
 
@@ -112,8 +112,9 @@ bool hides(ivec2 texel, ivec2 other, int start, mat3 frame) {
 bool is_corner(ivec2 texel, ivec2 other, int start, mat3 frame) {
     if (any(notEqual(clamp(other, 0, map_size - 1), other))) { return false; }
     vec4 own = maps[start + texel.y * map_size + texel.x], met = maps[start + other.y * map_size + other.x];
+    vec3 end = frame * map_axis(texel, map_size) * own.w, beside = frame * map_axis(other, map_size) * met.w;
     return max(own.w, met.w) < 1e5 * scene_length && dot(own.xyz, met.xyz) < 0.99
-        && joined(frame * map_axis(texel, map_size) * own.w, own.xyz, frame * map_axis(other, map_size) * met.w, met.xyz);
+        && !is_behind(end, beside, met.xyz) && !is_behind(beside, end, own.xyz);
 }
 
 // 1 beside a corner; 2 … 5 beside a vertex of three planes, and which of the texel's own corners is towards it.
@@ -183,7 +184,7 @@ float corner_overlap(Texel met, vec3 offset, vec3 normal, vec3 axis) {
 }
 
 // Share of a VPL's light that reaches a pixel. The hit of the nearest ray shades it if each is behind the other's
-// plane. At a corner, so do the hits of the three rays around it.
+// plane. At a corner, so do the planes of the three rays around it that no hit of the four is behind.
 float visibility(int vpl, vec3 position, vec3 normal) {
     if (map_size == 0) { return 1.0; }
     mat3 frame = map_frame(vpls[vpl + 1].xyz);
@@ -198,19 +199,20 @@ float visibility(int vpl, vec3 position, vec3 normal) {
     float hidden = dot(offset, normal) < 0.0
         ? overlap(own.end, own.plane, offset, normal) : rim_overlap(own, offset, normal, frame[2]);
     if (own.mark > 0u) {
-        ivec2 start = inside / own.side * own.side, side = ivec2(own.side);
+        ivec2 start = inside / own.side * own.side;
         uint vertex = own.mark - 2u;
-        bvec2 beyond = own.mark == 1u ? greaterThanEqual(2.0 * place, vec2(2 * start + side))
+        bvec2 beyond = own.mark == 1u ? greaterThanEqual(2.0 * place, vec2(2 * start + own.side))
             : bvec2((vertex & 1u) != 0u, (vertex & 2u) != 0u);
-        ivec2 beside = start + mix(ivec2(-1), side, beyond);
-        hidden = max(hidden, corner_overlap(own, offset, normal, frame[2]));
+        ivec2 beside = start + ivec2(beyond.x ? own.side : -1, beyond.y ? own.side : -1);
+        Texel met[4] = Texel[4](own, own, own, own);
         for (int i = 1; i < 4; ++i) {
             ivec2 around = ivec2((i & 1) != 0 ? beside.x : inside.x, (i & 2) != 0 ? beside.y : inside.y);
-            if (any(notEqual(clamp(around, 0, finest - 1), around))) { continue; }
-            Texel other = texel_at(vpl, around, frame);
-            if (joined(own.end, own.plane, other.end, other.plane)) {
-                hidden = max(hidden, corner_overlap(other, offset, normal, frame[2]));
-            }
+            if (clamp(around, 0, finest - 1) == around) { met[i] = texel_at(vpl, around, frame); }
+        }
+        for (int i = 0; i < 4; ++i) {
+            bool counts = !is_behind(met[i].end, own.end, own.plane);
+            for (int j = 0; j < 4; ++j) { counts = counts && !is_behind(met[j].end, met[i].end, met[i].plane); }
+            if (counts) { hidden = max(hidden, corner_overlap(met[i], offset, normal, frame[2])); }
         }
     }
     return 1.0 - clamp((hidden - visibility_bias) / visibility_softness, 0.0, 1.0);

@@ -75,10 +75,9 @@ def corner_overlap(end, end_normal, receiver, receiver_normal) -> float:
     return dot(end - receiver, end_normal) / length(receiver)
 
 
-def are_joined(end, end_normal, other, other_normal) -> bool:
-    """Whether two hits lie in one plane or on the two sides of a concave corner."""
-    rounding = ROUNDING * length(end)
-    return dot(end - other, other_normal) > -rounding and dot(end - other, end_normal) < rounding
+def is_behind(end, other, other_normal) -> bool:
+    """Whether a hit lies behind the plane of another one, by more than rounding."""
+    return dot(end - other, other_normal) < -ROUNDING * (length(end) + length(other))
 
 
 def corner_marks(end: np.ndarray, normal: np.ndarray, farthest: float) -> np.ndarray:
@@ -90,7 +89,8 @@ def corner_marks(end: np.ndarray, normal: np.ndarray, farthest: float) -> np.nda
     marks = np.zeros((size, size), int)
 
     def is_corner(a: tuple[int, int], b: tuple[int, int]) -> bool:
-        return dot(normal[a], normal[b]) < CORNER_COSINE and are_joined(end[a], normal[a], end[b], normal[b])
+        behind = is_behind(end[a], end[b], normal[b]) or is_behind(end[b], end[a], normal[a])
+        return dot(normal[a], normal[b]) < CORNER_COSINE and not behind
 
     for own in np.ndindex(size, size):
         for vertex, (x, y) in enumerate(VERTICES):
@@ -162,12 +162,13 @@ def vpl_visibility(position, normal, vpl: dict, maps: dict, scene_length: float,
     is_block = maps["block"][coarse] >= 0
     mark = 1 if is_block else maps["corner"][coarse]
     if mark > 0:
-        hidden = max(hidden, corner_overlap(*own, receiver, receiver_normal))
-        for x, y in texels_around(place, 1 if is_block else refinement, mark):
-            if min(x, y) >= 0 and max(x, y) < finest:
-                other = met_at(maps, x, y)
-                if are_joined(*own, *other):
-                    hidden = max(hidden, corner_overlap(*other, receiver, receiver_normal))
+        around = texels_around(place, 1 if is_block else refinement, mark)
+        met = [own] + [
+            met_at(maps, x, y) if min(x, y) >= 0 and max(x, y) < finest else own for x, y in around
+        ]
+        for each in met:
+            if not is_behind(each[0], *own) and not any(is_behind(other[0], *each) for other in met):
+                hidden = max(hidden, corner_overlap(*each, receiver, receiver_normal))
     return float(seen_share(hidden, bias, softness))
 
 

@@ -37,7 +37,7 @@ const float CORNER_COSINE = 0.99;
 
 // Whether two hits are on two sides of a concave corner.
 bool is_corner(MetSurface met, MetSurface other) {
-    return dot(met.normal, other.normal) < CORNER_COSINE && are_joined(met, other);
+    return dot(met.normal, other.normal) < CORNER_COSINE && !is_behind(met, other) && !is_behind(other, met);
 }
 
 // The corner mark of a texel.

@@ -119,12 +119,9 @@ float rim_overlap(MetSurface met, vec3 receiver, vec3 receiver_normal) {
         * inversesqrt(dot(receiver, receiver));
 }
 
-// Whether two hits lie in one plane or on the two sides of a concave corner: neither is behind the plane of the other,
-// but for rounding.
-bool are_joined(MetSurface met, MetSurface other) {
-    vec3 apart = met.end - other.end;
-    float rounding = VISIBILITY_ROUNDING * length(met.end);
-    return dot(apart, other.normal) > -rounding && dot(apart, met.normal) < rounding;
+// Whether a hit lies behind the plane of another one, by more than rounding.
+bool is_behind(MetSurface met, MetSurface other) {
+    return dot(met.end - other.end, other.normal) < -VISIBILITY_ROUNDING * (length(met.end) + length(other.end));
 }
 
 // The overlap of a receiver with a surface that reaches as far as the receiver's direction, because a corner does: the
@@ -138,8 +135,9 @@ float corner_overlap(MetSurface met, vec3 receiver, vec3 receiver_normal) {
     return dot(between, receiver_normal) * share > VISIBILITY_ROUNDING ? dot(between, met.normal) * share : -1.0;
 }
 
-// The overlap of a receiver with its own texel's surface and those of three texels around it that are joined to that.
-// Between two rays on either side of a concave corner, the nearer of the two planes is in sight.
+// The overlap of a receiver with the planes of its own texel's hit and of three around it. A plane counts if none of the
+// four hits is behind it, so that it reaches across all of them, and if its hit is not behind the own plane: between two
+// rays on either side of a concave corner, the nearer of the two planes is in sight.
 float joined_overlap(MapTexel own, vec2 place, int map_start, vec3 receiver, vec3 receiver_normal) {
     ivec2 inside = ivec2(place), start = inside / own.side * own.side;
     bvec2 beyond = greaterThanEqual(2.0 * place, vec2(2 * start + own.side));
@@ -148,15 +146,21 @@ float joined_overlap(MapTexel own, vec2 place, int map_start, vec3 receiver, vec
         beyond = bvec2((vertex & 1u) != 0u, (vertex & 2u) != 0u);
     }
     ivec2 beside = ivec2(beyond.x ? start.x + own.side : start.x - 1, beyond.y ? start.y + own.side : start.y - 1);
-    float overlap = corner_overlap(own.met, receiver, receiver_normal);
+    MetSurface met[4];
+    met[0] = own.met;
     for (int i = 1; i < 4; ++i) {
         ivec2 around = ivec2((i & 1) != 0 ? beside.x : inside.x, (i & 2) != 0 ? beside.y : inside.y);
-        if (any(lessThan(around, ivec2(0))) || any(greaterThanEqual(around, ivec2(VISIBILITY_FINEST)))) {
-            continue;
+        bool on_map = all(greaterThanEqual(around, ivec2(0))) && all(lessThan(around, ivec2(VISIBILITY_FINEST)));
+        met[i] = on_map ? map_texel(around, map_start).met : own.met;
+    }
+    float overlap = -1.0;
+    for (int i = 0; i < 4; ++i) {
+        bool counts = !is_behind(met[i], own.met);
+        for (int j = 0; j < 4; ++j) {
+            counts = counts && !is_behind(met[j], met[i]);
         }
-        MetSurface other = map_texel(around, map_start).met;
-        if (are_joined(own.met, other)) {
-            overlap = max(overlap, corner_overlap(other, receiver, receiver_normal));
+        if (counts) {
+            overlap = max(overlap, corner_overlap(met[i], receiver, receiver_normal));
         }
     }
     return overlap;

@@ -221,16 +221,22 @@ class _Lookup:
 
         before, behind = _dot(end - receiver, normal), _dot(end - receiver, met_normal)
         overlap = jnp.where(away < 0.0, jnp.minimum(before, behind), rim(end, met_normal))
-        marked = self._corner[coarse] > 0
-        overlap = jnp.where(marked, jnp.maximum(overlap, corner(end, met_normal)), overlap)
-        rounding = VISIBILITY_ROUNDING * jnp.linalg.norm(end, axis=-1)
-        for other_place in self._around(place, own_place, coarse):
-            inside = ((other_place >= 0) & (other_place < self._finest)).all(-1)
-            _, other, other_normal = self._met(jnp.clip(other_place, 0, self._finest - 1))
-            apart = end - other
-            joined = (_dot(apart, other_normal) > -rounding) & (_dot(apart, met_normal) < rounding)
-            counts = inside & joined & marked
-            overlap = jnp.where(counts, jnp.maximum(overlap, corner(other, other_normal)), overlap)
+        ends, normals = [end], [met_normal]
+        for around in self._around(place, own_place, coarse):
+            on_map = ((around >= 0) & (around < self._finest)).all(-1)[..., None]
+            _, other, other_normal = self._met(jnp.clip(around, 0, self._finest - 1))
+            ends.append(jnp.where(on_map, other, end))
+            normals.append(jnp.where(on_map, other_normal, met_normal))
+        lengths = [jnp.linalg.norm(each, axis=-1) for each in ends]
+
+        def is_behind(i: int, j: int) -> Array:
+            return _dot(ends[i] - ends[j], normals[j]) < -VISIBILITY_ROUNDING * (lengths[i] + lengths[j])
+
+        for i in range(4):
+            counts = (self._corner[coarse] > 0) & ~is_behind(i, 0)
+            for j in range(4):
+                counts = counts & ~is_behind(j, i)
+            overlap = jnp.where(counts, jnp.maximum(overlap, corner(ends[i], normals[i])), overlap)
         return overlap / distance
 
     def _met(self, place: Array) -> tuple[Array, Array, Array]:

@@ -176,7 +176,7 @@ def test_the_surrogate_sees_this(pair):
 
 
 def test_maps_are_cast_like_this(gl_context):
-    """Distances to 1e-4, normals to 16 bits, the same texels at corners and silhouettes, the same finer rays."""
+    """Distances to 1e-4, normals to 16 bits; the same corners, silhouettes and finer rays."""
     scene = SceneBuffers(gl_context, boxes())
     hierarchy = RayHierarchy(gl_context, boxes(), scene)
     resources = scene.resources()

@@ -1,8 +1,8 @@
 """Run every command whose figures stand in a document, and say which figures changed.
 
-`make figures`, or `python scripts/figures.py [--only NAME] [--list]`. docs/figures.toml ties figures to commands.
-Output is kept in out/figures, in a folder for each state of the program: an interrupted run goes on with the same
-command. The exit code is 1 where a figure changed beyond its tolerance, or has no row any more.
+`make figures`, or `python scripts/figures.py [--only NAME] [--list]`. docs/figures.toml ties figures to
+commands. Output is kept in out/figures, in a folder for each state of the program: an interrupted run goes on
+with the same command. The exit code is 1 where a figure changed beyond its tolerance, or has no row any more.
 """
 
 import argparse
@@ -37,7 +37,9 @@ def main() -> int:
     """Run the commands, print the table, and return the exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--only", metavar="NAME", help="one command of docs/figures.toml")
-    parser.add_argument("--list", action="store_true", help="list the commands and their figures, run nothing")
+    parser.add_argument(
+        "--list", action="store_true", help="list the commands and their figures, run nothing"
+    )
     chosen = parser.parse_args()
     ties = read_ties(REPOSITORY / "docs" / "figures.toml")
     if chosen.only is not None and chosen.only not in ties.commands:
@@ -109,7 +111,9 @@ def _run(command: Command, path: Path) -> None:
             print(f"{line}: exit code {done.returncode}", file=sys.stderr)
             return
         printed = done.stdout
-    values = markdown_values(printed, command.keys) if command.keys else row_values(json.loads(printed)["rows"])
+    values = (
+        markdown_values(printed, command.keys) if command.keys else row_values(json.loads(printed)["rows"])
+    )
     # Written whole or not at all: what exists is not run again.
     part = path.with_suffix(".part")
     part.write_text(json.dumps(values), encoding="utf-8")

@@ -24,10 +24,11 @@
     text = "in {} of {} scenes"
     reason = "..."
 
-A row is `name` for a benchmark's value, `name:ratio` or `name:against`; `median(...)`, `min(...)` or `max(...)`
-over the rows that a pattern with `*` matches; and any of them after `100*`. Of a command that prints a Markdown
-table, the first `keys` cells of a line and the heading of a column, joined by dots, name a cell, and the numbers
-of a cell are `name`, `name#2`, `name#3`. In a `[[table]]`, `{heading}` stands for the cell in that column.
+A row is `name` for a benchmark's value, `name:ratio` or `name:against`; `median(...)`, `min(...)` or
+`max(...)` over the rows that a pattern with `*` matches; and any of them after `100*`. Where a command prints
+a Markdown table, the first `keys` cells of a line and the heading of a column, joined by dots, name a cell.
+The numbers of a cell are `name`, `name#2`, `name#3`. In a `[[table]]`, `{heading}` stands for the cell in
+that column.
 """
 
 import re
@@ -260,7 +261,7 @@ def decimals(shown: str) -> int:
 
 
 def has_changed(shown: str, value: float | None, tolerance: float) -> bool:
-    """Whether a figure is further from what is shown than `tolerance`, relative, and half of its last digit."""
+    """Whether a value is further from what is shown than `tolerance` and half of the last digit."""
     was = number(shown)
     if was is None or value is None:
         return was is not value

@@ -67,7 +67,7 @@ class TracedRun:
     samples: int
     """Per pixel."""
     seconds: float
-    """Of the processor: other load on the core does not count."""
+    """The processor's, so that other load on the core does not count."""
     relmse: float
 
 

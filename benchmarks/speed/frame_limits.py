@@ -1,8 +1,8 @@
 """The least time of each pass of a frame: what it must compute and move, at the machine's rates.
 
 What a pass moves is every resource that it declares, once. What it computes is counted for the passes that
-arithmetic or rays rule; others are ruled by memory. A limit is no forecast: a pass of several dependent steps,
-or one that draws small triangles, cannot reach it.
+arithmetic or rays rule; others are ruled by memory. A limit is no forecast: a pass of several dependent
+steps, or one that draws small triangles, cannot reach it.
 """
 
 import math
@@ -21,10 +21,10 @@ from vpltune.renderer.frame.runtime import DrawnFrame
 from vpltune.renderer.gpu.resources import Access, Resource, Resources
 
 DISC_OPERATIONS = 170.0
-"""Operations of a pair of receiver and disc, counted in shaders/common/vpl_disc.glsl as `FLOPS_PER_PAIR` is."""
+"""Operations of a receiver and a disc, counted in shaders/common/vpl_disc.glsl as `FLOPS_PER_PAIR` is."""
 LOOKUP_OPERATIONS = 65.0
-"""Operations of a lookup into a visibility map, counted in shaders/common/vpl_visibility.glsl, and halved: about
-half of all pairs face away from each other and have none."""
+"""Operations of a lookup into a visibility map, counted in shaders/common/vpl_visibility.glsl, and halved:
+about half of all pairs face away from each other and have none."""
 BOX_OPERATIONS = 40.0
 """Operations of a ray at a node of a binary hierarchy: two boxes of three slabs each."""
 TRIANGLE_OPERATIONS = 50.0
@@ -46,11 +46,14 @@ USED_IN_PART = ("pixel_list", "visibility_details", "light_cells")
 """Buffers with room for the worst case, of which a frame moves an unknown part: not counted."""
 
 
-def pass_limits(drawn: DrawnFrame, config: TunedConfig, triangles: int, rates: MachineRates) -> dict[str, float]:
+def pass_limits(
+    drawn: DrawnFrame, config: TunedConfig, triangles: int, rates: MachineRates
+) -> dict[str, float]:
     """The least milliseconds of each pass that draws a frame again, in the order of the frame."""
     operations = pass_operations(drawn, config, triangles)
     return {
-        name: rates.milliseconds(operations.get(name, 0.0), moved) for name, moved in pass_bytes(drawn).items()
+        name: rates.milliseconds(operations.get(name, 0.0), moved)
+        for name, moved in pass_bytes(drawn).items()
     }
 
 

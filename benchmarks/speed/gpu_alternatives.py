@@ -1,4 +1,4 @@
-"""VPLs as the 2010 study had them, and a frame without a GPU: what our gather and placement are compared with."""
+"""The gather and the placement against those of the 2010 study, and Python's part of a frame."""
 
 import time
 from collections.abc import Iterator

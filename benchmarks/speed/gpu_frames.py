@@ -38,8 +38,8 @@ class Timing:
     """How long a row may take, and how often it is timed."""
 
     row_seconds: float = 20.0
-    """Seconds beyond which a row is left out or timed less often. A choice: all rows are then done in minutes on
-    a GPU, and within half an hour on a software renderer."""
+    """Seconds beyond which a row is left out or timed less often. A choice: all rows are then done in minutes
+    on a GPU, and within half an hour on a software renderer."""
     frames: int = 5
     """Timed frames, of which the median counts. A choice."""
 

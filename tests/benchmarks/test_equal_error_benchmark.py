@@ -27,7 +27,7 @@ def test_five_scenes_that_chose_nothing():
 
 @pytest.mark.parametrize("power", [1.0, 1.5])
 def test_the_count_is_where_the_error_is_the_frame_s(power):
-    """Exact for relMSE = 8/samples^p and seconds = 0.5 + 0.1·samples; the slower of two runs does not count."""
+    """Exact for relMSE = 8/samples^p and seconds = 0.5 + 0.1·samples; of two runs, the faster counts."""
     runs = [TracedRun(n, 0.5 + 0.1 * n, 8.0 / n**power) for n in (4, 16, 64)]
     runs.append(TracedRun(16, 9.0, 8.0 / 16**power))
     count, seconds = count_and_seconds(runs, 8.0 / 30.0**power)

@@ -43,7 +43,9 @@ def test_every_number_in_a_result_table_is_tied_or_marked(page):
 
 def test_every_command_is_used_and_every_benchmark_exists():
     assert {each.command for each in TIES.tied()} == set(TIES.commands)
-    named = {line.split()[2] for c in TIES.commands.values() for line in c.run if line.startswith("vpltune bench")}
+    named = {
+        line.split()[2] for c in TIES.commands.values() for line in c.run if line.startswith("vpltune bench")
+    }
     assert named <= set(benchmark_names())
     assert all(mark["reason"] for mark in TIES.unmeasured)
 

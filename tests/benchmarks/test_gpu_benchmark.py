@@ -46,7 +46,7 @@ def test_bytes_of_a_pass_are_those_of_its_targets(runtime):
     """Tone mapping reads radiance (16 bytes a pixel) and writes 4; geometry writes 4 + 4 + 8."""
     moved = pass_bytes(runtime.draw(room_view(size=SIZE), PLAIN))
     pixels = SIZE[0] * SIZE[1]
-    assert list(moved)[0] == "geometry"
+    assert next(iter(moved)) == "geometry"
     assert moved["tone_mapping"] == pytest.approx(20 * pixels, abs=64)
     assert 16 * pixels <= moved["geometry"] < 16 * pixels + 1e5
 

@@ -42,7 +42,7 @@ def bench(
                 raise
             exit_code = INTERRUPTED
     if exit_code:
-        warn((f"interrupted after {len(rows)} rows",))
+        warn((f"interrupted after {len(rows)} row{'s' if len(rows) > 1 else ''}",))
     document = {"machine": machine_description(), "rows": [row.as_dict() for row in rows]}
     return Report(document, (document["machine"], _table(document["rows"])), exit_code)
 

@@ -8,6 +8,7 @@ with the same command. The exit code is 1 where a figure changed beyond its tole
 import argparse
 import hashlib
 import json
+import os
 import shlex
 import subprocess
 import sys
@@ -26,9 +27,12 @@ from benchmarks.harness.figures import (
     read_ties,
     row_values,
 )
+from benchmarks.harness.page_examples import example_values, examples
 from benchmarks.tuning.fit_never_loses import program_digest
 
 REPOSITORY = Path(__file__).resolve().parents[1]
+COLUMNS = 120
+"""Columns of the terminal that examples print for: the pages'."""
 DIGEST_LENGTH = 16
 """Hexadecimal digits of a folder's name. A choice."""
 
@@ -50,7 +54,7 @@ def main() -> int:
         return 0
     folder = REPOSITORY / "out" / "figures" / _digest()
     folder.mkdir(parents=True, exist_ok=True)
-    values = outputs(commands, folder)
+    values = outputs(commands, ties, folder)
     lines, changed = compared([each for each in ties.tied() if each.command in values], ties, values)
     print("\n".join(lines))
     failed = [name for name in commands if name not in values]
@@ -58,7 +62,7 @@ def main() -> int:
     return 1 if changed or failed else 0
 
 
-def outputs(commands: dict[str, Command], folder: Path) -> dict[str, Values]:
+def outputs(commands: dict[str, Command], ties: Ties, folder: Path) -> dict[str, Values]:
     """What each command printed, from `folder` or by running it; without those that failed."""
     found: dict[str, Values] = {}
     left = {name: command for name, command in commands.items() if not (folder / f"{name}.json").exists()}
@@ -72,11 +76,11 @@ def outputs(commands: dict[str, Command], folder: Path) -> dict[str, Values]:
             pace = spent / done_minutes if done_minutes else 1.0
             remaining = pace * (all_minutes - done_minutes)
             print(
-                f"{done_minutes / all_minutes:.0%}, about {remaining:.0f} min left: {command.run[0]}",
+                f"{done_minutes / all_minutes:.0%}, about {remaining:.0f} min left: {name}",
                 file=sys.stderr,
                 flush=True,
             )
-            _run(command, path)
+            _run(command, path, ties)
             done_minutes += command.minutes
         if path.exists():
             found[name] = json.loads(path.read_text(encoding="utf-8"))
@@ -102,18 +106,29 @@ def compared(tied: list[Tied], ties: Ties, values: dict[str, Values]) -> tuple[l
     return lines, changed
 
 
-def _run(command: Command, path: Path) -> None:
-    """Run a command's lines in turn, and write what the last one printed into `path`."""
-    printed = ""
-    for line in command.run:
-        done = subprocess.run(_argv(line), cwd=REPOSITORY, stdout=subprocess.PIPE, text=True, check=False)
+def _run(command: Command, path: Path, ties: Ties) -> None:
+    """Run a command's lines in turn, and write the figures that they printed into `path`."""
+    lines = command.run or [example.command for example in examples(ties.text(command.page))]
+    printed = []
+    for line in lines:
+        done = subprocess.run(
+            _argv(line),
+            cwd=REPOSITORY,
+            stdout=subprocess.PIPE,
+            text=True,
+            check=False,
+            env=os.environ | {"COLUMNS": str(COLUMNS)},
+        )
         if done.returncode:
             print(f"{line}: exit code {done.returncode}", file=sys.stderr)
             return
-        printed = done.stdout
-    values = (
-        markdown_values(printed, command.keys) if command.keys else row_values(json.loads(printed)["rows"])
-    )
+        printed.append(done.stdout)
+    if command.page:
+        values = {k: v for index, text in enumerate(printed) for k, v in example_values(index, text).items()}
+    elif command.keys:
+        values = markdown_values(printed[-1], command.keys)
+    else:
+        values = row_values(json.loads(printed[-1])["rows"])
     # Written whole or not at all: what exists is not run again.
     part = path.with_suffix(".part")
     part.write_text(json.dumps(values), encoding="utf-8")
@@ -131,7 +146,9 @@ def _list(ties: Ties, commands: dict[str, Command]) -> None:
     tied = ties.tied()
     for name, command in commands.items():
         count = sum(each.command == name for each in tied)
-        print(f"{name}: {' && '.join(command.run)} ({count} figures, about {command.minutes:.0f} min)")
+        print(
+            f"{name}: {' && '.join(command.run) or command.page} ({count} figures, about {command.minutes:.0f} min)"
+        )
 
 
 def _digest() -> str:

@@ -19,6 +19,10 @@
     command = "quality"
     columns = { default = ["{scene}.{split}.default"] }
 
+    [commands.fit_page]              # the commands after `$` in a page, and every number that they print
+    page = "docs/jobs/fit.md"
+    minutes = 5
+
     [[unmeasured]]                   # figures that no command prints here, and why
     document = "docs/results.md"
     text = "in {} of {} scenes"
@@ -39,6 +43,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from statistics import median
 
+from benchmarks.harness.page_examples import examples
+
 Values = Mapping[str, float | None]
 """What a command printed, by name; None where it printed a dash."""
 
@@ -54,8 +60,10 @@ _OVER = {"median": median, "min": min, "max": max}
 class Command:
     """What prints figures."""
 
-    run: tuple[str, ...]
     minutes: float
+    run: tuple[str, ...] = ()
+    page: str = ""
+    """A page whose examples are run, in place of `run`."""
     tolerance: float = 0.02
     keys: int = 0
     """Leading cells that name a line of the Markdown table that it prints; 0 for a benchmark's rows."""
@@ -95,6 +103,9 @@ class Ties:
         """
         found = [each for figure in self.figures for each in self._of_figure(figure)]
         found += [each for table in self.tables for each in self._of_table(table)]
+        found += [
+            each for name, command in self.commands.items() for each in self._of_page(name, command.page)
+        ]
         unknown = {each.command for each in found} - set(self.commands)
         if unknown:
             raise ValueError(f"figures.toml: unknown commands {sorted(unknown)}")
@@ -132,6 +143,11 @@ class Ties:
             for heading, rows in table["columns"].items():
                 for (start, shown), row in zip(cells[heading].numbers(), rows, strict=True):
                     yield Tied(table["document"], start, shown, table["command"], row.format(**names))
+
+    def _of_page(self, name: str, page: str) -> Iterator[Tied]:
+        for index, example in enumerate(examples(self.text(page)) if page else ()):
+            for place, (start, shown) in enumerate(example.numbers()):
+                yield Tied(page, start, shown, name, f"{index}.{place}")
 
     def _places(self, tie: dict) -> list[tuple[int, str]]:
         """The numbers of a text, or of the whole table below a heading."""
@@ -171,7 +187,7 @@ def read_ties(path: Path) -> Ties:
     content = tomllib.loads(path.read_text(encoding="utf-8"))
     try:
         commands = {
-            name: Command(**{**members, "run": tuple(members["run"])})
+            name: Command(**{**members, "run": tuple(members.get("run", ()))})
             for name, members in content["commands"].items()
         }
     except (KeyError, TypeError) as error:
@@ -256,8 +272,9 @@ def evaluated(row: str, values: Values) -> float | None:
 
 
 def decimals(shown: str) -> int:
-    """Digits after the point."""
-    return len(shown.partition(".")[2])
+    """Digits after the point; 7 for 2.22e-05."""
+    mantissa, _, exponent = shown.partition("e")
+    return max(0, len(mantissa.partition(".")[2]) - int(exponent or 0))
 
 
 def has_changed(shown: str, value: float | None, tolerance: float) -> bool:

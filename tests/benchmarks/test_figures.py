@@ -13,6 +13,7 @@ from benchmarks.harness.figures import (
     read_ties,
     row_values,
 )
+from benchmarks.harness.page_examples import example_values, examples
 from benchmarks.harness.registry import benchmark_names
 from benchmarks.harness.row import Row
 
@@ -88,6 +89,33 @@ def test_a_printed_table_is_named_by_its_first_cells():
     assert number("−1.5") == -1.5
 
 
+PAGE = """# Page
+
+```
+$ vpltune one --size 64x48 -o out/a-3
+error 0.25, 2.2e-05 of 7 (56.9 s)
+wrote out/a-3
+$ vpltune two
+│ -1.5 │ 2 % │
+```
+
+```json
+{"not": 9}
+```
+"""
+
+
+def test_numbers_of_examples_are_those_that_the_command_measured():
+    """No parts of names and sizes, and no seconds."""
+    found = list(examples(PAGE))
+    assert [example.command for example in found] == ["vpltune one --size 64x48 -o out/a-3", "vpltune two"]
+    assert [[shown for _, shown in e.numbers()] for e in found] == [["0.25", "2.2e-05", "7"], ["-1.5", "2"]]
+    assert all(PAGE[start:].startswith(shown) for e in found for start, shown in e.numbers())
+    assert example_values(1, found[1].output) == {"1.0": -1.5, "1.1": 2.0}
+    assert not has_changed("2.2e-05", 2.24e-5, 0.0)
+    assert has_changed("2.2e-05", 2.4e-5, 0.0)
+
+
 def made_ties(folder: Path, more: str = ""):
     """A document with a table and a sentence, and a command that prints the table with 0.50 as 0.60."""
     (folder / "docs").mkdir()
@@ -140,7 +168,7 @@ def test_figures_are_run_compared_and_kept(tmp_path, monkeypatch, capfd):
     ties = made_ties(tmp_path)
     monkeypatch.setattr(figures, "REPOSITORY", tmp_path)
     for _ in range(2):
-        values = figures.outputs(ties.commands, tmp_path)
+        values = figures.outputs(ties.commands, ties, tmp_path)
         lines, changed = figures.compared(ties.tied(), ties, values)
         assert changed == 3
         assert lines[2:] == [
@@ -149,7 +177,7 @@ def test_figures_are_run_compared_and_kept(tmp_path, monkeypatch, capfd):
             "| page.md:9 | a_room.1,024.relmse | 0.50 | 0.60 | yes |",
         ]
     assert (tmp_path / "runs").read_text(encoding="utf-8") == "x"
-    assert capfd.readouterr().err == "0%, about 1 min left: python print.py\n"
+    assert capfd.readouterr().err == "0%, about 1 min left: made\n"
 
 
 def test_a_command_that_fails_keeps_nothing(tmp_path, monkeypatch, capfd):
@@ -157,7 +185,7 @@ def test_a_command_that_fails_keeps_nothing(tmp_path, monkeypatch, capfd):
     import figures
 
     monkeypatch.setattr(figures, "REPOSITORY", tmp_path)
-    failing = Command(("python -c 'raise SystemExit(3)'",), minutes=1.0)
-    assert figures.outputs({"failing": failing}, tmp_path) == {}
+    failing = Command(1.0, ("python -c 'raise SystemExit(3)'",))
+    assert figures.outputs({"failing": failing}, TIES, tmp_path) == {}
     assert "exit code 3" in capfd.readouterr().err
     assert not list(tmp_path.glob("*.json"))

@@ -146,9 +146,8 @@ def _list(ties: Ties, commands: dict[str, Command]) -> None:
     tied = ties.tied()
     for name, command in commands.items():
         count = sum(each.command == name for each in tied)
-        print(
-            f"{name}: {' && '.join(command.run) or command.page} ({count} figures, about {command.minutes:.0f} min)"
-        )
+        what = " && ".join(command.run) or command.page
+        print(f"{name}: {what} ({count} figures, about {command.minutes:.0f} min)")
 
 
 def _digest() -> str:

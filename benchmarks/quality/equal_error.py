@@ -21,6 +21,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,6 +33,9 @@ from vpltune.renderer.frame.frame_timing import truthful_clock
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.scene import Scene
 from vpltune.renderer.scene.views import View
+
+if TYPE_CHECKING:
+    from vpltune.tuner.reference.indirect_irradiance import IndirectIrradiance
 
 SEED = 2
 """Seed of the generated scenes: the first that leaves 2 when divided by 3."""
@@ -47,7 +51,6 @@ REFERENCE_NOISE = 1e-3
 """relMSE of the reference's noise, which the halves cancel. A choice: that of a fit's references."""
 REFERENCE_SAMPLES = 1024
 """Most samples per pixel in each half of the reference. A choice."""
-PEERS = ("plain path tracing", "the reference estimator")
 
 
 @dataclass(frozen=True)
@@ -186,7 +189,10 @@ def equal_error(scene: Path | int, effort: Effort) -> EqualError:
 
     traced = traced_scene(read)
     parts = (traced.wavefront, traced.surfaces, traced.triangles, view)
-    peers = dict(zip(PEERS, (PlainPathTracing(*parts), IndirectIrradiance(*parts)), strict=True))
+    peers: dict[str, IndirectIrradiance] = {
+        "plain path tracing": PlainPathTracing(*parts),
+        "the reference estimator": IndirectIrradiance(*parts),
+    }
     for peer in peers.values():
         traced_run(peer, 2, 0, error)  # compiles
     frames: list[float] = []
@@ -212,10 +218,14 @@ def frame_seconds(runtime: Runtime, view: View) -> float:
     return time.process_time() - start
 
 
-def traced_run(peer, samples: int, seed: int, error: Callable[[np.ndarray], float]) -> TracedRun:
+def traced_run(
+    peer: "IndirectIrradiance", samples: int, seed: int, error: Callable[[np.ndarray], float]
+) -> TracedRun:
     """Trace `samples` per pixel, a half of them in each of the peer's two estimates."""
     start = time.process_time()
-    total = sum(batch.sum(axis=0, dtype=np.float64) for _, batch in peer.batches(0, samples // 2, seed, 1))
+    total = np.zeros(())
+    for _, batch in peer.batches(0, samples // 2, seed, 1):
+        total = total + batch.sum(axis=0, dtype=np.float64)
     seconds = time.process_time() - start
     return TracedRun(samples, seconds, error(total / (samples // 2 * 2)))
 

@@ -44,6 +44,8 @@ RASTER_TARGETS = {
 """What passes write that draw triangles: declared by their framebuffer, not by name."""
 USED_IN_PART = ("pixel_list", "visibility_details", "light_cells")
 """Buffers with room for the worst case, of which a frame moves an unknown part: not counted."""
+WHOLE_RSM = ("reflective_shadow_map", "virtual_point_lights")
+"""Passes that go through the whole RSM; others look up a part of it, which is not counted."""
 
 
 def pass_limits(
@@ -127,7 +129,9 @@ class _Recorder(PassClock):
         """Add resources to those of the pass that is drawing."""
         if self._pass:
             self.used[self._pass] |= {
-                name: _size(resources[name]) for name in names if name not in USED_IN_PART
+                name: _size(resources[name])
+                for name in names
+                if name not in USED_IN_PART and (not name.startswith("rsm_") or self._pass in WHOLE_RSM)
             }
 
 

@@ -58,6 +58,11 @@ class MeasuredScene:
     rates: MachineRates
     timing: Timing
 
+    @property
+    def against_limit(self) -> str:
+        """What rows are compared with that have a limit, and the clock that timed them."""
+        return f"its limit ({self.rates.clock} clock)"
+
     def runtime(self, options: RuntimeOptions | None = None) -> Runtime:
         """A runtime of its own: what it keeps on the GPU goes when it goes."""
         return Runtime(self.scene, options or RuntimeOptions(), context=self.context)
@@ -107,9 +112,10 @@ def pass_rows(measured: MeasuredScene) -> Iterator[Row]:
         once = measured.pass_milliseconds(drawn, 1)
         frames = measured.timing.frames_for(sum(once.values()))
         milliseconds = once if frames == 1 else measured.pass_milliseconds(drawn, frames)
-        against = f"its limit; {size[0]}x{size[1]}, {PASS_COUNT} VPLs, {measured.rates.clock} clock"
         for name, value in milliseconds.items():
-            yield Row(f"pass.{visibility}.{name}", value, "ms", against, limits[name])
+            yield Row(
+                f"pass.{PASS_SIZE}.{visibility}.{name}", value, "ms", measured.against_limit, limits[name]
+            )
 
 
 def frame_rows(measured: MeasuredScene) -> Iterator[Row]:
@@ -132,7 +138,7 @@ def frame_rows(measured: MeasuredScene) -> Iterator[Row]:
                     taken = measured.frame_milliseconds(runtime, view, config)
                     series.note(count, taken)
                     limit = sum(measured.limits(runtime.draw(view, config), config).values())
-                    yield Row(name, taken, "ms", f"limits of its passes, {measured.rates.clock} clock", limit)
+                    yield Row(name, taken, "ms", measured.against_limit, limit)
 
 
 def frame_count() -> int:

@@ -1,8 +1,8 @@
 """How good `auto` is on scenes outside its training, against the defaults and each scene's own fit.
 
 The shipped prior is trained on generated scenes alone. It is judged on scenes generated from a seed that
-chose nothing (docs/chosen_on.md), and on all shipped and third-party ones. Every image is drawn by the runtime
-and compared with the path tracer. The figures of each scene are written to out/auto/scenes.json.
+chose nothing (docs/chosen_on.md), and on all shipped and third-party ones. Every image is drawn by the
+runtime and compared with the path tracer. The figures of each scene are written to out/auto/scenes.json.
 
 `python -m benchmarks.tuning.auto FOLDER` writes the clip of `benchmarks.quality.carried_light`, in which a
 lamp is carried from a small room into a hall.

@@ -19,6 +19,7 @@ from statistics import median
 from typing import Any
 
 import moderngl
+import numpy as np
 
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import REPOSITORY, present_scenes
@@ -109,9 +110,14 @@ def sources() -> dict[str, tuple[Callable[[], Scene], bool]]:
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """Ratios of the new default to the old one, medians and worst: scenes that chose nothing, and the others."""
+    """Ratios of the new default to the old one, medians and worst; a row for each scene's share of beads."""
     scenes = measured({"old": OLD, "default": DEFAULT}, sources(), progress)
-    return ratio_rows(scenes)
+    beads = [
+        Row(f"{scene.name}.off_share", scene.figures["default"]["off_share"], "of the pixels", "the old default",
+            scene.figures["old"]["off_share"])
+        for scene in scenes
+    ]  # fmt: skip
+    return ratio_rows(scenes) + beads
 
 
 def ratio_rows(scenes: list[Measured]) -> list[Row]:
@@ -179,9 +185,18 @@ def _figures(
         milliseconds = runtime.frame_milliseconds(timed, config, FRAMES)
         figures[name] = {
             **{each: mean[each] for each in (*FIGURES, "energy_ratio")},
+            "off_share": float(np.mean([_off_share(view) for view in drawn])),
             "milliseconds": milliseconds,
         }
     return figures
+
+
+def _off_share(view: CapturedView) -> float:
+    """Share of the pixels that are off by more than the reference there and than its mean: beads at contacts."""
+    valid = view.valid
+    reference = view.reference.irradiance[valid].mean(axis=1)
+    error = np.abs(view.captured.indirect_irradiance[valid].mean(axis=1) - reference)
+    return float((error > np.maximum(reference, reference.mean())).mean())
 
 
 def write_front(path: Path, scenes: list[Measured], names: list[str]) -> None:

@@ -177,7 +177,7 @@ def default_choice(view: View) -> Quality:
 
 
 def block_side(choice: Quality) -> int:
-    """The side of the blocks that share the VPLs, in pixels. A choice to be timed never leaves it to the frame."""
+    """Side of the pixel blocks that share the VPLs, which a choice to be timed never leaves to the frame."""
     assert choice.interleave != "auto", "a choice spells its interleaving out"
     return choice.interleave
 

@@ -138,7 +138,7 @@ def _measure(work: tuple[Cell, Path]) -> str:
     else:
         scene = Path(cell.scene)
     start = ArtistParameters() if cell.mode == "default" else replace(ArtistParameters(), vpl_count=FEW)
-    options = FitOptions(start=TunedConfig(start), density=cell.mode == "few", held_out=HELD_OUT)
+    options = FitOptions(start=TunedConfig(start), held_out=HELD_OUT)
     document = fit_scene(scene, folder / cell.name / cell.mode, options, lambda *_: None).document
     write_text_whole(folder / cell.file, strict_json(result_of(cell, document)) + "\n")
     return f"{cell.name}, {cell.mode}"

@@ -20,7 +20,7 @@ from vpltune.renderer.techniques.vpls_readback import VplsReadback
 
 SIZE = "720p"
 VPL_COUNT = 1024
-"""VPLs: the default count."""
+"""VPLs of placement and gather. A choice."""
 READBACK_DRAWS = 128
 """VPLs that are drawn one by one; their time is scaled to `VPL_COUNT`. A choice."""
 WARM_UP_DRAWS = 4
@@ -39,7 +39,8 @@ PYTHON_LIMIT_MS = 1.0
 
 def alternative_rows(measured: MeasuredScene) -> Iterator[Row]:
     """The gather against a draw for each VPL, placement against a read-back, and Python's part of a frame."""
-    config = TunedConfig(ArtistParameters(vpl_count=VPL_COUNT), visibility="transmittance")
+    points = ArtistParameters(vpl_count=VPL_COUNT, lloyd_iterations=0, density_importance=0.0)
+    config = TunedConfig(points, visibility="transmittance", quality=Quality(interleave=1))
     drawn = measured.runtime().draw(measured.sized(SIZES[SIZE]), config)
     milliseconds = measured.pass_milliseconds(drawn, 1)
     context = measured.context
@@ -72,8 +73,8 @@ def alternative_rows(measured: MeasuredScene) -> Iterator[Row]:
 
 
 def python_row(measured: MeasuredScene) -> Row:
-    """The CPU time of a whole frame with moving lights, where every draw, dispatch and clear does nothing."""
-    config = TunedConfig(ArtistParameters(vpl_count=VPL_COUNT), quality=Quality(interleave=4))
+    """CPU time of the default frame with moving lights, where every draw, dispatch and clear does nothing."""
+    config = TunedConfig()
     runtime = measured.runtime(RuntimeOptions(light_path="tiles"))
     moving = moving_lights(measured, PYTHON_LIGHTS)
     lights = DynamicLights(moving.records)

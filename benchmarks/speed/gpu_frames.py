@@ -21,16 +21,14 @@ from vpltune.renderer.scene.views import View
 SIZES = {"720p": (1280, 720), "1080p": (1920, 1080), "1440p": (2560, 1440), "4K": (3840, 2160)}
 """Width and height of the frames in pixels."""
 PASS_SIZE = "1080p"
-PASS_COUNT = 1024
-"""VPLs of the pass rows: the default count."""
+PASS_CONFIG = TunedConfig()
+"""The config of the pass rows: the default."""
 COUNTS = (64, 256, 1024, 4096)
-"""VPLs of the frames. A choice: powers of four round the default."""
+"""VPLs of the frames. A choice."""
 PLACEMENTS = {"points": 0, "discs": 2}
-"""Lloyd iterations by the name of the placement. A choice: as many as a fit at the default count has."""
+"""Lloyd iterations by the name of the placement: as many as the default has."""
 INTERLEAVES = {"full": 1, "interleaved": 4}
 """Pixels along the side of an interleaved block. A choice."""
-DEFAULT_INTERLEAVE = 4
-"""The same for the pass rows: what a game would use. A choice."""
 
 
 @dataclass(frozen=True)
@@ -99,14 +97,10 @@ class MeasuredScene:
 
 
 def pass_rows(measured: MeasuredScene) -> Iterator[Row]:
-    """A row for each pass of the default frame, interleaved, for each visibility."""
+    """A row for each pass of the default frame, for each visibility."""
     size = SIZES[PASS_SIZE]
     for visibility in VISIBILITIES:
-        config = TunedConfig(
-            ArtistParameters(vpl_count=PASS_COUNT),
-            visibility=visibility,
-            quality=Quality(interleave=DEFAULT_INTERLEAVE),
-        )
+        config = PASS_CONFIG.seen_by(visibility)
         drawn = measured.runtime().draw(measured.sized(size), config)
         limits = measured.limits(drawn, config)
         once = measured.pass_milliseconds(drawn, 1)

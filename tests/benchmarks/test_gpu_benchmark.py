@@ -21,7 +21,9 @@ from vpltune.renderer.scene.dynamic_lights import DynamicLights, point_lights
 SIZE = (32, 24)
 RATES = MachineRates(1e9, 1e9, "wall")
 PLAIN = TunedConfig(
-    ArtistParameters(vpl_count=16), visibility="transmittance", quality=Quality(rsm_resolution=64)
+    ArtistParameters(vpl_count=16, lloyd_iterations=0),
+    visibility="transmittance",
+    quality=Quality(interleave=1, rsm_resolution=64),
 )
 
 
@@ -96,7 +98,7 @@ def test_rows_of_a_small_table(gl_context, monkeypatch):
     """Each pass and each frame has a row beside its limit."""
     monkeypatch.setattr(gpu_frames, "SIZES", {"1080p": SIZE})
     monkeypatch.setattr(gpu_frames, "COUNTS", (4, 16))
-    monkeypatch.setattr(gpu_frames, "PASS_COUNT", 16)
+    monkeypatch.setattr(gpu_frames, "PASS_CONFIG", TunedConfig(ArtistParameters(vpl_count=16)))
     measured = MeasuredScene(colored_room(), room_view(), gl_context, RATES, Timing(frames=1))
     passes = {row.name: row for row in pass_rows(measured)}
     assert {"pass.1080p.maps.vpl_visibility_maps", "pass.1080p.transmittance.vpl_gather"} < set(passes)

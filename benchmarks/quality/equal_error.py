@@ -104,10 +104,10 @@ def measured_rows(
     found = []
     for index, scene in enumerate(chosen):
         name = loaded(scene, effort.size)[1].name
-        progress(f"{name}: reference", index / len(chosen))
+        progress("equal_error", index / len(chosen))
         # On all cores; the process that measures finds it in the cache.
         reference_halves(scene, effort)
-        progress(f"{name}: one core", (index + 0.5) / len(chosen))
+        progress("equal_error", (index + 0.5) / len(chosen))
         spawn = multiprocessing.get_context("spawn")
         with one_core(), ProcessPoolExecutor(1, mp_context=spawn) as process:
             found.append(row_of(name, process.submit(equal_error, scene, effort).result()))

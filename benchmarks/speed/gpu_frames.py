@@ -1,7 +1,8 @@
 """Milliseconds of passes and of whole frames, by size, VPL count, placement and interleaving."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import moderngl
 
@@ -14,7 +15,6 @@ from vpltune.renderer.config.tuned_config import VISIBILITIES, TunedConfig
 from vpltune.renderer.frame.frame_timing import PassClock, frame_milliseconds
 from vpltune.renderer.frame.runtime import DrawnFrame, Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
-from vpltune.renderer.scene.dynamic_lights import DynamicLights
 from vpltune.renderer.scene.scene import Scene
 from vpltune.renderer.scene.views import View
 
@@ -82,15 +82,8 @@ class MeasuredScene:
             clock.end_frame()
         return clock.milliseconds()
 
-    def frame_milliseconds(
-        self, runtime: Runtime, view: View, config: TunedConfig, lights: DynamicLights | None = None
-    ) -> float:
-        """Milliseconds of a whole frame. The first, untimed one makes and compiles what is missing."""
-
-        def draw() -> None:
-            runtime.draw(view, config, lights=lights)
-
-        draw()
+    def frame_milliseconds(self, draw: Callable[[], object]) -> float:
+        """Milliseconds of a whole frame, which `draw` has drawn before."""
         once = frame_milliseconds(self.context, draw, 1, self.rates.clock)
         frames = self.timing.frames_for(once)
         return once if frames == 1 else frame_milliseconds(self.context, draw, frames, self.rates.clock)
@@ -129,9 +122,10 @@ def frame_rows(measured: MeasuredScene) -> Iterator[Row]:
                         quality=Quality(interleave=interleave),
                     )
                     runtime = measured.runtime()
-                    taken = measured.frame_milliseconds(runtime, view, config)
+                    drawn = runtime.draw(view, config)
+                    taken = measured.frame_milliseconds(partial(runtime.draw, view, config))
                     series.note(count, taken)
-                    limit = sum(measured.limits(runtime.draw(view, config), config).values())
+                    limit = sum(measured.limits(drawn, config).values())
                     yield Row(name, taken, "ms", measured.against_limit, limit)
 
 
@@ -159,11 +153,11 @@ class Series:
         return after + (work - more) * max(0.0, after - before) / (more - less)
 
     def too_long(self, work: float) -> bool:
-        """Whether two frames, the least that a row draws, would take longer than a row may."""
-        return 2e-3 * self.expected(work) > self._timing.row_seconds
+        """Whether three frames, the least that a row draws, would take longer than a row may."""
+        return 3e-3 * self.expected(work) > self._timing.row_seconds
 
     def left_out(self, name: str, work: float) -> Row:
         """The row that stands for one that is not measured: its value is not a number."""
         expected = self.expected(work) / 1e3
-        against = f"left out: a frame would take {expected:.0f} s; the limit of a row"
+        against = f"left out: a frame would take {expected:.2g} s; the limit of a row"
         return Row(name, float("nan"), "ms", against, 1e3 * self._timing.row_seconds)

@@ -87,7 +87,7 @@ class EqualError:
     """A run at about that count."""
 
 
-def rows(progress: Callable[[str, float], None]) -> list[Row]:
+def rows(progress: Callable[[str, float], None]) -> Iterator[Row]:
     """For each scene, seconds of the faster peer against seconds of our frame; last, the median ratio."""
     return measured_rows(progress, scenes(), Effort())
 
@@ -99,9 +99,9 @@ def scenes() -> list[Path | int]:
 
 def measured_rows(
     progress: Callable[[str, float], None], chosen: list[Path | int], effort: Effort
-) -> list[Row]:
-    """The rows of some scenes. Each is measured in a process of its own, which may use one core alone."""
-    found = []
+) -> Iterator[Row]:
+    """The rows of some scenes, then their median ratio. Each scene is measured in a process of its own, which may use one core alone."""
+    ratios = []
     for index, scene in enumerate(chosen):
         name = loaded(scene, effort.size)[1].name
         progress("equal_error", index / len(chosen))
@@ -110,10 +110,11 @@ def measured_rows(
         progress("equal_error", (index + 0.5) / len(chosen))
         spawn = multiprocessing.get_context("spawn")
         with one_core(), ProcessPoolExecutor(1, mp_context=spawn) as process:
-            found.append(row_of(name, process.submit(equal_error, scene, effort).result()))
+            row = row_of(name, process.submit(equal_error, scene, effort).result())
+        ratios.append(row.ratio)
+        yield row
     progress("equal_error", 1.0)
-    ratio = median(row.ratio for row in found)
-    return [*found, Row("equal_error.median", ratio, "1", "a frame of ours; median over scenes", 1.0)]
+    yield Row("equal_error.median", median(ratios), "1", "a frame of ours; median over scenes", 1.0)
 
 
 def row_of(name: str, measured: EqualError) -> Row:

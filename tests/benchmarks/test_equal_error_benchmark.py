@@ -1,5 +1,9 @@
 """Path tracing to a frame's error: the fit over samples, errors without noise, and a small run."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -12,6 +16,7 @@ from benchmarks.quality.equal_error import (
     count_and_seconds,
     loaded,
     measured_rows,
+    one_core,
     relmse_without_noise,
     scenes,
 )
@@ -23,6 +28,14 @@ def test_five_scenes_that_chose_nothing():
     assert SEED % 3 == 2
     assert GENERATED == 2
     assert loaded(0, (16, 9))[1].name == "room-000"
+
+
+def test_a_process_has_one_core_and_ours_keeps_its_own():
+    before = os.sched_getaffinity(0)
+    with one_core():
+        command = [sys.executable, "-c", "import os; print(len(os.sched_getaffinity(0)))"]
+        assert subprocess.run(command, capture_output=True, check=True).stdout.strip() == b"1"
+    assert os.sched_getaffinity(0) == before
 
 
 @pytest.mark.parametrize("power", [1.0, 1.5])

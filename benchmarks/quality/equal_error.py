@@ -100,7 +100,10 @@ def scenes() -> list[Path | int]:
 def measured_rows(
     progress: Callable[[str, float], None], chosen: list[Path | int], effort: Effort
 ) -> Iterator[Row]:
-    """The rows of some scenes, then their median ratio. Each scene is measured in a process of its own, which may use one core alone."""
+    """The rows of some scenes, then their median ratio.
+
+    Each scene is measured in a process of its own, which may use one core alone.
+    """
     ratios = []
     for index, scene in enumerate(chosen):
         name = loaded(scene, effort.size)[1].name

@@ -55,7 +55,7 @@ def alternative_rows(measured: MeasuredScene) -> Iterator[Row]:
         f"vpls.{SIZE}.placement",
         milliseconds["virtual_point_lights"],
         "ms",
-        f"RSM read back in {1e3 * (read - start):.3g} ms, then placed on the processor",
+        f"RSM read back in {1e3 * (read - start):.3g} ms, and placed on the processor",
         1e3 * (placed - start),
     )
     readback.draw(drawn.inputs, vpls[:WARM_UP_DRAWS])

@@ -12,7 +12,6 @@ from jaxtyping import Float64
 from vpltune.renderer.scene.placement.free_places import CLEARANCE, PLACES, height_fraction, is_room
 from vpltune.renderer.scene.placement.free_space import (
     FreeSpace,
-    free_space,
     march_rays,
     marched,
     sphere_directions,
@@ -26,6 +25,7 @@ from vpltune.renderer.scene.placement.sight import (
     mean_square_distance_world,
     seen_by,
 )
+from vpltune.renderer.scene.placement.subject import space_of_view
 from vpltune.renderer.scene.scene import Camera, Light, Scene
 
 # A choice: inner and outer half angle of the spot in a room, radians.
@@ -49,7 +49,7 @@ def default_light(scene: Scene, camera: Camera) -> tuple[Light, str]:
 
     The choice depends on the scene and the camera only, and not on the scale of the scene.
     """
-    space = free_space(scene)
+    space = space_of_view(scene, camera)
     sight = seen_by(space, camera)
     positions, axes, (inner_cone, outer_cone) = _light_candidates(space, camera, sight)
     chosen, axis, lit_share = _best_spot(space, sight, positions, axes, outer_cone)

@@ -35,6 +35,8 @@ class Places:
     """Whether a surface is hit."""
     front: Bool[np.ndarray, "places directions"]
     """Whether a front face is hit."""
+    detail: Bool[np.ndarray, "places directions"]
+    """Whether what is hit is not plain (`FreeSpace.detail`)."""
 
     def walled_in(self) -> Bool[np.ndarray, " places"]:
         """Which places have surfaces nearly all around, most of them facing the place."""
@@ -57,7 +59,8 @@ def free_places(space: FreeSpace) -> Places:
     directions = sphere_directions(PLACE_DIRECTIONS)
     hits = marched(space, positions, directions)
     front = hits.hit & front_facing(space, hits.voxel, np.broadcast_to(directions, (*hits.hit.shape, 3)))
-    return Places(positions, np.where(hits.hit, hits.distance, 0.0), hits.hit, front)
+    detail = hits.hit & space.detail.ravel()[hits.voxel]
+    return Places(positions, np.where(hits.hit, hits.distance, 0.0), hits.hit, front, detail)
 
 
 def is_room(space: FreeSpace) -> bool:

@@ -170,7 +170,7 @@ def _table_top() -> Scene:
 def _thin_pieces() -> Scene:
     """A tree-like scatter: 400 leaves about a trunk, on a lawn."""
     random = np.random.default_rng(1)
-    leaves = random.normal(0.0, 0.5, (400, 3)) + [0.0, 2.2, 0.0]
+    leaves = random.normal((0.0, 2.2, 0.0), 0.5, (400, 3))
     u, v = random.normal(0.0, 0.07, (2, 400, 3))
     quads = np.stack([leaves, u, v], axis=1)
     lawn = _mesh("lawn", np.array([[[-4, 0, -4], [0, 0, 8], [8, 0, 0]]], np.float64), WHITE)

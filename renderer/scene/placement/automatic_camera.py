@@ -11,7 +11,6 @@ from jaxtyping import Float64
 
 from vpltune.renderer.scene.placement.composition import (
     ENOUGH_SURFACES,
-    NEAR,
     Composition,
     composition,
 )
@@ -37,11 +36,14 @@ FINALISTS = 48
 # A choice: a side of a room is open if at least this share of the rays through it hit a surface, at a median
 # depth of at least this share of the room.
 OPENING_HITS, OPENING_DEPTH = 0.95, 0.4
+# Choices: a surface obstructs the view if it is nearer than this share of the median distance all around, or,
+# outside, of the grid's diagonal.
+NEAR_INSIDE, NEAR_OUTSIDE = 0.45, 0.12
 # A choice: a surface may fill this share of the image without a penalty.
 LARGEST = 0.35
 # Choices: elevations in degrees, number of azimuths, and distances of the cameras around an object. At the
 # distance 1 the whole object is in the image.
-ELEVATIONS, AZIMUTHS, DISTANCES = (10.0, 20.0, 32.0), 8, (1.0, 0.82, 0.66, 0.52)
+ELEVATIONS, AZIMUTHS, DISTANCES = (4.0, 14.0, 28.0, 44.0), 8, (1.0, 0.86, 0.72, 0.6)
 # A choice: pieces of detail that are counted in and out of an image.
 DETAIL_PIECES = 4000
 # A choice: a camera gains nothing from a directly lit share of the image beyond this.
@@ -110,7 +112,8 @@ def _cameras_inside(space: FreeSpace, places: Places) -> list[tuple[float, Camer
     diagonal = float(np.linalg.norm(space.shape))
     # The square root of the visible area, if every surface faced the camera.
     reach = np.sqrt(np.where(places.front, depth**2, 0.0) @ inside.T / count) / diagonal
-    near = (places.hit & (places.distance < NEAR * diagonal)) @ inside.T / count
+    near_distance = NEAR_INSIDE * places.median_distance()
+    near = (places.hit & (places.distance < near_distance[:, None])) @ inside.T / count
     detail = places.detail @ inside.T / count
     # A place surrounded by front faces is in a room. A fifth of the directions may be open without penalty,
     # as in a box without a front wall.
@@ -119,7 +122,7 @@ def _cameras_inside(space: FreeSpace, places: Places) -> list[tuple[float, Camer
     score = (
         hit_share**3
         * (0.05 + front_share**2)
-        * np.sqrt(reach)
+        * reach**0.25
         * (0.2 + np.minimum(detail, 0.4))
         * (1.0 + np.minimum(spread, 0.5))
         * (1.0 - near) ** 3
@@ -161,7 +164,7 @@ def _indoor_score(seen: Composition) -> float:
     """Score of an image inside a room: much visible area, many surfaces, and a view into the depth."""
     return (
         seen.hit**3
-        * math.sqrt(seen.area)
+        * seen.area**0.25
         * _surface_score(seen)
         * (1.0 + min(seen.spread, 0.5))
         * (1.0 - seen.near) ** 3
@@ -214,6 +217,7 @@ def _cameras_outside(space: FreeSpace) -> list[tuple[float, Camera]]:
     pieces = np.argwhere(space.detail if space.detail.any() else space.occupied) + 0.5
     pieces = pieces[((pieces >= low) & (pieces <= high)).all(axis=1)]
     pieces = pieces[:: max(1, len(pieces) // DETAIL_PIECES)]
+    near = NEAR_OUTSIDE * float(np.linalg.norm(space.shape))
     cameras = []
     for elevation in np.radians(ELEVATIONS):
         for azimuth in 2.0 * math.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS:
@@ -233,7 +237,8 @@ def _cameras_outside(space: FreeSpace) -> list[tuple[float, Camera]]:
                 eye = space.to_world(target + distance * back)
                 camera = Camera(look_at(eye, space.to_world(target)), OBJECT_YFOV)
                 framed = float((reach + local[:, 2] < distance).mean())
-                cameras.append((_rounded(framed**2 * _outdoor_score(composition(space, camera))), camera))
+                seen = composition(space, camera, near)
+                cameras.append((_rounded(framed**3 * _outdoor_score(seen)), camera))
     return cameras
 
 

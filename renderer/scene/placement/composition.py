@@ -13,8 +13,6 @@ from vpltune.renderer.scene.placement.free_space import FreeSpace
 from vpltune.renderer.scene.placement.sight import MIDDLE_RAYS, Sight, front_facing, seen_by
 from vpltune.renderer.scene.scene import Camera
 
-# A choice: a surface nearer than this share of the grid's diagonal obstructs the view.
-NEAR = 0.12
 # Choices: size in voxels of the pieces that detail is counted in, and by which planes are told apart.
 PIECE, PLANE = 6.0, 4.0
 # A choice: steps by which normals and albedo are told apart.
@@ -32,7 +30,7 @@ class Composition:
     front: float
     """Share that hits a front face."""
     near: float
-    """Share that hits a surface nearer than `NEAR`."""
+    """Share that hits a surface so near that it obstructs the view."""
     surfaces: float
     """Effective number of surfaces, background included: exp of the entropy of their shares."""
     largest: float
@@ -45,8 +43,8 @@ class Composition:
     """Mean distance in the middle of the image, relative to the median distance."""
 
 
-def composition(space: FreeSpace, camera: Camera) -> Composition:
-    """What the camera's 4:3 image shows."""
+def composition(space: FreeSpace, camera: Camera, near: float) -> Composition:
+    """What the camera's 4:3 image shows; a surface nearer than `near` (voxels) obstructs the view."""
     sight = seen_by(space, camera)
     hit = sight.hits.hit
     if not hit.any():
@@ -62,7 +60,7 @@ def composition(space: FreeSpace, camera: Camera) -> Composition:
     return Composition(
         hit=sight.hit_fraction,
         front=float(front.sum()) / hit.size,
-        near=float((distance < NEAR * np.linalg.norm(space.shape)).sum()) / hit.size,
+        near=float((distance < near).sum()) / hit.size,
         surfaces=float(np.exp(-(shares * np.log(shares)).sum())),
         largest=float(shares[1:].max()),
         spread=float(np.std(np.log(np.maximum(distance, 0.5)))),

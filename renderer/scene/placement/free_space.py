@@ -26,9 +26,6 @@ LONGEST_SIDE = 128
 # A choice: empty voxels around the scene's bounds. The odd fraction keeps surfaces at round fractions of the
 # bounds away from voxel faces.
 MARGIN = 2.37
-# A choice: a voxel is plain if its mean normal is at least this long; below, two faces in it meet at more
-# than 2·arccos 0.85 = 64°.
-PLAIN = 0.85
 # Shortest march step in voxels. Half a voxel cannot jump over a surface one voxel thick, except at a corner.
 SHORTEST_STEP = 0.5
 
@@ -51,6 +48,8 @@ class FreeSpace:
     """Area-weighted mean of the front-face normals in the voxel. Length 0 (opposing faces cancel) to 1."""
     albedo: Float32[np.ndarray, "nx ny nz 3"]
     """Area-weighted mean of the albedo in the voxel, linear; 0 in an empty voxel."""
+    detail: Bool[np.ndarray, "nx ny nz"]
+    """Whether the voxel holds an edge, a curve or small pieces, and not only plain surfaces."""
 
     def to_world(self, positions: Float64[np.ndarray, "*n 3"]) -> Float64[np.ndarray, "*n 3"]:
         """World positions from positions in voxel units."""
@@ -59,11 +58,6 @@ class FreeSpace:
     def to_voxels(self, positions_world: Float64[np.ndarray, "*n 3"]) -> Float64[np.ndarray, "*n 3"]:
         """Positions in voxel units, rounded to `DECIMALS`, from world positions."""
         return np.round((positions_world - self.low_world) / self.voxel_world, DECIMALS)
-
-    @functools.cached_property
-    def detail(self) -> Bool[np.ndarray, "nx ny nz"]:
-        """Which voxels hold an edge, a curve or a thin piece: their normals differ (see `PLAIN`)."""
-        return self.occupied & ((self.normals**2).sum(axis=3) < PLAIN**2)
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -109,9 +103,9 @@ def space_within(
     voxel = spacing_within_budget(triangles, size * relative_voxel)
     low_world = low - MARGIN * voxel
     shape = np.ceil(np.round(extent / voxel, DECIMALS) + 2.0 * MARGIN).astype(np.int64)
-    area, normals, albedo = rasterised(triangles, low_world, voxel, shape)
+    area, normals, albedo, detail = rasterised(triangles, low_world, voxel, shape)
     clearance = _distance_to_occupied(area > 0.0)
-    return FreeSpace(low_world, voxel, area > 0.0, clearance, area, normals, albedo)
+    return FreeSpace(low_world, voxel, area > 0.0, clearance, area, normals, albedo, detail)
 
 
 def _distance_to_occupied(occupied: Bool[np.ndarray, "nx ny nz"]) -> Float32[np.ndarray, "nx ny nz"]:

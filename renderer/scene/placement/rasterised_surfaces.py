@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int64
+from jaxtyping import Bool, Float32, Float64, Int64
 
 from vpltune.renderer.scene.placement.triangle_albedo import triangle_albedo
 from vpltune.renderer.scene.scene import Scene, transform_points
@@ -19,6 +19,9 @@ SAMPLE_SPACING = 0.3
 # Voxel coordinates are rounded to this many decimals: coarser than double rounding at any scene scale, and
 # much finer than a voxel. Scenes at different scales then give the same grid.
 DECIMALS = 5
+# A choice: a voxel is plain if the mean of its triangles' unit normals is at least this long; below, two
+# faces in it meet at more than 2·arccos 0.85 = 64°.
+PLAIN = 0.85
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,20 +127,33 @@ def rasterised(
     voxel: float,
     shape: Int64[np.ndarray, "3"],
 ) -> tuple[
-    Float32[np.ndarray, "nx ny nz"], Float32[np.ndarray, "nx ny nz 3"], Float32[np.ndarray, "nx ny nz 3"]
+    Float32[np.ndarray, "nx ny nz"],
+    Float32[np.ndarray, "nx ny nz 3"],
+    Float32[np.ndarray, "nx ny nz 3"],
+    Bool[np.ndarray, "nx ny nz"],
 ]:
-    """Area, mean front-face normal and mean albedo in each voxel. A voxel is occupied if its area is positive.
+    """Area, mean front-face normal, mean albedo, and whether there is detail in each voxel of a grid.
 
+    A voxel is occupied if its area is positive. Means are weighted by area. Detail is where unit normals
+    differ, each weighted by the share of its triangle in the voxel: small pieces outweigh the ground below.
     What lies outside the grid is left out.
     """
     cells = int(shape.prod())
     area = np.zeros(cells)
-    sums = np.zeros((6, cells))
+    sums = np.zeros((10, cells))
     corners = triangles.corners
     area_vector = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / voxel**2
     # A degenerate triangle has no area; 1e-6 keeps its voxels occupied.
     triangle_area = np.maximum(np.linalg.norm(area_vector, axis=1), 1e-6)
-    weights = np.concatenate([area_vector, triangle_area[:, None] * triangles.albedo], axis=1).T
+    weights = np.concatenate(
+        [
+            area_vector,
+            triangle_area[:, None] * triangles.albedo,
+            area_vector / triangle_area[:, None],
+            np.ones((len(corners), 1)),
+        ],
+        axis=1,
+    ).T
     for triangle, positions, share in _surface_samples(corners, voxel):
         index = np.floor(np.round((positions - low_world) / voxel, DECIMALS)).astype(np.int64)
         inside = ((index >= 0) & (index < shape)).all(axis=1)
@@ -146,10 +162,13 @@ def rasterised(
         area += np.bincount(flat, share * triangle_area[triangle], cells)
         for total, weight in zip(sums, weights, strict=True):
             total += np.bincount(flat, share * weight[triangle], cells)
-    means = (sums / np.maximum(area, np.finfo(np.float64).tiny)).T
+    means = (sums[:6] / np.maximum(area, np.finfo(np.float64).tiny)).T
     normals, albedo = np.round(means[:, :3], 3), np.round(means[:, 3:], 3)
+    unit = sums[6:9] / np.maximum(sums[9], np.finfo(np.float64).tiny)
+    detail = (area > 0.0) & (np.round(np.linalg.norm(unit, axis=0), 3) < PLAIN)
     return (
         area.reshape(shape).astype(np.float32),
         normals.reshape(*shape, 3).astype(np.float32),
         albedo.reshape(*shape, 3).astype(np.float32),
+        detail.reshape(shape),
     )

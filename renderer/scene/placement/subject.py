@@ -13,8 +13,9 @@ from vpltune.renderer.scene.placement.free_space import FreeSpace, free_space, s
 from vpltune.renderer.scene.placement.rasterised_surfaces import placed_triangles, triangles_in_box
 from vpltune.renderer.scene.scene import Camera, Scene
 
-# A choice: the subject gets a grid of its own if its detail is less than this share of the grid's longest side.
-SMALL_SUBJECT = 0.2
+# A choice: the subject gets a grid of its own if its detail takes less than this share of the grid's longest
+# side.
+SMALL_SUBJECT = 0.3
 # A choice: share of the detail at either end of each axis that does not count, so that one stray piece cannot
 # make the subject large.
 STRAY = 0.02

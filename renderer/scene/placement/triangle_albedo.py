@@ -6,8 +6,10 @@ from jaxtyping import Float32, Float64
 from vpltune.renderer.files.srgb import linear_from_srgb
 from vpltune.renderer.scene.scene import Mesh, Scene, Texture
 
-# A choice: a texture is averaged over blocks to at most this many texels a side before the lookup.
+# A choice: a texture is averaged over at most this many blocks a side before the lookup.
 BLOCKS = 16
+# A choice: texels a side that are read of a texture, evenly spread: 16 in a block.
+TEXELS = 64
 
 
 def triangle_albedo(scene: Scene, mesh: Mesh) -> Float32[np.ndarray, "triangles 3"]:
@@ -21,9 +23,10 @@ def triangle_albedo(scene: Scene, mesh: Mesh) -> Float32[np.ndarray, "triangles 
 
 def _looked_up(texture: Texture, uv: Float32[np.ndarray, "n 2"]) -> Float64[np.ndarray, "n 3"]:
     """Texels of the blurred texture, linear. Every wrap mode counts as `repeat`."""
-    height, width, _ = texture.texels_srgb.shape
+    rows, columns = (np.arange(0, size, -(-size // TEXELS)) for size in texture.texels_srgb.shape[:2])
+    linear = linear_from_srgb(texture.texels_srgb[rows[:, None], columns] / 255.0)
+    height, width, _ = linear.shape
     rows, columns = (np.linspace(0, size, min(size, BLOCKS) + 1).astype(int) for size in (height, width))
-    linear = linear_from_srgb(texture.texels_srgb / 255.0)
     sums = np.add.reduceat(np.add.reduceat(linear, rows[:-1], axis=0), columns[:-1], axis=1)
     blocks = sums / (np.diff(rows)[:, None] * np.diff(columns))[:, :, None]
     wrapped = np.nan_to_num(uv.astype(np.float64)) % 1.0

@@ -1,7 +1,8 @@
-"""An automatic camera for a scene that has none, chosen by how much it sees.
+"""An automatic camera for a scene that has none, chosen by what it shows (`composition`).
 
 In a room, the camera stands inside, or in front of the open side if there is one. Any other scene counts as
-an object, which the camera looks at from outside. Up is +Y, as in glTF.
+an object, which the camera looks at from outside. Where the subject is much smaller than the scene, as a
+house on a plain, the subject alone counts. Up is +Y, as in glTF.
 """
 
 import math
@@ -36,14 +37,14 @@ FINALISTS = 48
 # A choice: a side of a room is open if at least this share of the rays through it hit a surface, at a median
 # depth of at least this share of the room.
 OPENING_HITS, OPENING_DEPTH = 0.95, 0.4
-# Choices: a surface obstructs the view if it is nearer than this share of the median distance all around, or,
+# Choices: a surface obstructs the view if it is nearer than this share of the place's `Places.reach`, or,
 # outside, of the grid's diagonal.
-NEAR_INSIDE, NEAR_OUTSIDE = 0.45, 0.12
+NEAR_INSIDE, NEAR_OUTSIDE = 0.25, 0.12
 # A choice: a surface may fill this share of the image without a penalty.
 LARGEST = 0.35
 # Choices: elevations in degrees, number of azimuths, and distances of the cameras around an object. At the
 # distance 1 the whole object is in the image.
-ELEVATIONS, AZIMUTHS, DISTANCES = (4.0, 14.0, 28.0, 44.0), 8, (1.0, 0.86, 0.72, 0.6)
+ELEVATIONS, AZIMUTHS, DISTANCES = (4.0, 14.0, 28.0, 44.0), 8, (1.0, 0.9, 0.8, 0.7)
 # A choice: pieces of detail that are counted in and out of an image.
 DETAIL_PIECES = 4000
 # A choice: a camera gains nothing from a directly lit share of the image beyond this.
@@ -109,20 +110,21 @@ def _cameras_inside(space: FreeSpace, places: Places) -> list[tuple[float, Camer
     log_depth = np.where(places.hit, np.log(depth), 0.0)
     mean_log = log_depth @ inside.T / hits
     spread = np.sqrt(np.maximum(log_depth**2 @ inside.T / hits - mean_log**2, 0.0))
-    diagonal = float(np.linalg.norm(space.shape))
-    # The square root of the visible area, if every surface faced the camera.
-    reach = np.sqrt(np.where(places.front, depth**2, 0.0) @ inside.T / count) / diagonal
-    near_distance = NEAR_INSIDE * places.median_distance()
+    # Square root of the visible area, if every surface faced the camera.
+    area = np.sqrt(np.where(places.front, depth**2, 0.0) @ inside.T / count)
+    near_distance = NEAR_INSIDE * places.reach()
     near = (places.hit & (places.distance < near_distance[:, None])) @ inside.T / count
     detail = places.detail @ inside.T / count
     # A place surrounded by front faces is in a room. A fifth of the directions may be open without penalty,
     # as in a box without a front wall.
     indoors = np.minimum(places.front.mean(axis=1) / 0.8, 1.0) ** 4
     place_weight = indoors * _eye_height_weight(space, places.positions)
+    # An area weighs less in a large room, or an empty hall would win over a furnished room.
+    place_weight /= np.maximum(places.reach(), 1.0) ** 0.25
     score = (
         hit_share**3
         * (0.05 + front_share**2)
-        * reach**0.25
+        * np.sqrt(area)
         * (0.2 + np.minimum(detail, 0.4))
         * (1.0 + np.minimum(spread, 0.5))
         * (1.0 - near) ** 3
@@ -134,9 +136,8 @@ def _cameras_inside(space: FreeSpace, places: Places) -> list[tuple[float, Camer
         place, look = divmod(int(flat), len(looks))
         eye = space.to_world(places.positions[place])
         camera = Camera(look_at(eye, eye + space.voxel_world * looks[look]), YFOV)
-        finalists.append(
-            (_rounded(_indoor_score(composition(space, camera)) * float(place_weight[place])), camera)
-        )
+        seen = composition(space, camera, float(near_distance[place]))
+        finalists.append((_rounded(_indoor_score(seen) * float(place_weight[place])), camera))
     return finalists
 
 
@@ -164,7 +165,7 @@ def _indoor_score(seen: Composition) -> float:
     """Score of an image inside a room: much visible area, many surfaces, and a view into the depth."""
     return (
         seen.hit**3
-        * seen.area**0.25
+        * math.sqrt(seen.area)
         * _surface_score(seen)
         * (1.0 + min(seen.spread, 0.5))
         * (1.0 - seen.near) ** 3
@@ -172,9 +173,14 @@ def _indoor_score(seen: Composition) -> float:
     )
 
 
+def _without_excess(largest: float) -> float:
+    """1 for a largest surface up to `LARGEST`, falling to 0 where it fills the image."""
+    return min((1.0 - largest) / (1.0 - LARGEST), 1.0)
+
+
 def _surface_score(seen: Composition) -> float:
     """Score for many surfaces of which none fills the image."""
-    return math.sqrt(min(seen.surfaces, ENOUGH_SURFACES)) * (1.0 - max(seen.largest - LARGEST, 0.0)) ** 2
+    return math.sqrt(min(seen.surfaces, ENOUGH_SURFACES)) * _without_excess(seen.largest) ** 2
 
 
 def _eye_height_weight(space: FreeSpace, positions: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, " n"]:

@@ -72,7 +72,9 @@ def composition(space: FreeSpace, camera: Camera, near: float) -> Composition:
 def _surface_shares(space: FreeSpace, sight: Sight) -> Float64[np.ndarray, " surfaces"]:
     """Share of the rays on each surface: first the background, then planes and pieces of detail by albedo."""
     hit = sight.hits.hit
-    voxel, points = sight.hits.voxel[hit], sight.points[hit]
+    voxel = sight.hits.voxel[hit]
+    # Centres of the voxels, which on an axis-aligned plane do not vary as the hit points do.
+    points = np.stack(np.unravel_index(voxel, space.shape), axis=1) + 0.5
     normals = space.normals.reshape(-1, 3)[voxel].astype(np.float64)
     albedo = space.albedo.reshape(-1, 3)[voxel].astype(np.float64)
     detail = space.detail.ravel()[voxel]

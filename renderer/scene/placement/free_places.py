@@ -43,9 +43,9 @@ class Places:
         hits = self.hit.sum(axis=1)
         return (hits >= WALLED_IN * self.hit.shape[1]) & (self.front.sum(axis=1) >= FROM_FRONT * hits)
 
-    def median_distance(self) -> Float64[np.ndarray, " places"]:
-        """Median distance of what each place sees, in voxels; a direction without a surface counts as 0."""
-        return np.median(self.distance, axis=1)
+    def reach(self) -> Float64[np.ndarray, " places"]:
+        """Size of the room about each place in voxels: nine tenths of the directions see no farther."""
+        return np.quantile(self.distance, 0.9, axis=1)
 
     def share_walled_in(self) -> float:
         """Share of the places that are walled in, in [0, 1]; 0 if there are no places."""

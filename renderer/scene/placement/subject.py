@@ -20,7 +20,7 @@ SMALL_SUBJECT = 0.3
 # make the subject large.
 STRAY = 0.02
 # A choice: a grid about the subject is larger than its detail by this factor, so that some ground shows.
-SURROUNDINGS = 1.6
+SURROUNDINGS = 2.0
 # A choice: least height of that grid as a share of its width.
 LEAST_HEIGHT = 0.3
 # Grids, each about the subject of the one before. Three bring 10 km down to 0.5 m.

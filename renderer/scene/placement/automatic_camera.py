@@ -39,7 +39,10 @@ FINALISTS = 48
 OPENING_HITS, OPENING_DEPTH = 0.95, 0.4
 # Choices: a surface obstructs the view if it is nearer than this share of the place's `Places.reach`, or,
 # outside, of the grid's diagonal.
-NEAR_INSIDE, NEAR_OUTSIDE = 0.25, 0.12
+NEAR_INSIDE, NEAR_OUTSIDE = 0.35, 0.12
+# Choices: inside, a view with this share of detail is as good as with more; the other number keeps a view
+# without any from scoring zero.
+ENOUGH_DETAIL, LEAST_DETAIL = 0.25, 0.1
 # A choice: a surface may fill this share of the image without a penalty.
 LARGEST = 0.35
 # Choices: elevations in degrees, number of azimuths, and distances of the cameras around an object. At the
@@ -125,7 +128,7 @@ def _cameras_inside(space: FreeSpace, places: Places) -> list[tuple[float, Camer
         hit_share**3
         * (0.05 + front_share**2)
         * np.sqrt(area)
-        * (0.2 + np.minimum(detail, 0.4))
+        * (LEAST_DETAIL + np.minimum(detail, ENOUGH_DETAIL))
         * (1.0 + np.minimum(spread, 0.5))
         * (1.0 - near) ** 3
         * place_weight[:, None]
@@ -167,6 +170,7 @@ def _indoor_score(seen: Composition) -> float:
         seen.hit**3
         * math.sqrt(seen.area)
         * _surface_score(seen)
+        * (LEAST_DETAIL + min(seen.detail, ENOUGH_DETAIL))
         * (1.0 + min(seen.spread, 0.5))
         * (1.0 - seen.near) ** 3
         * min(max(seen.depth_ahead, 0.5), 1.4)

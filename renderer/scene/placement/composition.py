@@ -31,6 +31,8 @@ class Composition:
     """Share that hits a front face."""
     near: float
     """Share that hits a surface so near that it obstructs the view."""
+    detail: float
+    """Share that hits detail (`FreeSpace.detail`)."""
     surfaces: float
     """Effective number of surfaces, background included: exp of the entropy of their shares."""
     largest: float
@@ -48,7 +50,7 @@ def composition(space: FreeSpace, camera: Camera, near: float) -> Composition:
     sight = seen_by(space, camera)
     hit = sight.hits.hit
     if not hit.any():
-        return Composition(0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0)
+        return Composition(0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0)
     distance, voxel = sight.hits.distance[hit], sight.hits.voxel[hit]
     rays = (sight.points[hit] - space.to_voxels(camera.position_world)) / np.maximum(distance, 1e-6)[:, None]
     front = front_facing(space, voxel, rays)
@@ -61,6 +63,7 @@ def composition(space: FreeSpace, camera: Camera, near: float) -> Composition:
         hit=sight.hit_fraction,
         front=float(front.sum()) / hit.size,
         near=float((distance < near).sum()) / hit.size,
+        detail=float(space.detail.ravel()[voxel].sum()) / hit.size,
         surfaces=float(np.exp(-(shares * np.log(shares)).sum())),
         largest=float(shares[1:].max()),
         spread=float(np.std(np.log(np.maximum(distance, 0.5)))),

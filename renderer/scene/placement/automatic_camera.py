@@ -45,11 +45,8 @@ NEAR_INSIDE, NEAR_OUTSIDE = 0.35, 0.12
 ENOUGH_DETAIL, LEAST_DETAIL = 0.25, 0.1
 # A choice: a surface may fill this share of the image without a penalty.
 LARGEST = 0.35
-# Choices: elevations in degrees, number of azimuths, and distances of the cameras around an object. At the
-# distance 1 the whole object is in the image.
-ELEVATIONS, AZIMUTHS, DISTANCES = (4.0, 14.0, 28.0, 44.0), 8, (1.0, 0.9, 0.8, 0.7)
-# A choice: pieces of detail that are counted in and out of an image.
-DETAIL_PIECES = 4000
+# Choices: elevations in degrees and number of azimuths of the cameras around an object.
+ELEVATIONS, AZIMUTHS = (4.0, 14.0, 28.0, 44.0), 8
 # A choice: a camera gains nothing from a directly lit share of the image beyond this.
 ENOUGH_LIT = 0.45
 
@@ -221,12 +218,11 @@ def _cameras_before_openings(space: FreeSpace) -> list[tuple[float, Camera]]:
 
 
 def _cameras_outside(space: FreeSpace) -> list[tuple[float, Camera]]:
-    """Views from all around of the subject, whole or from closer by."""
+    """Views from all around that frame the whole subject."""
     low, high = detail_bounds(space)
     target = 0.5 * (low + high)
     pieces = np.argwhere(space.detail if space.detail.any() else space.occupied) + 0.5
     pieces = pieces[((pieces >= low) & (pieces <= high)).all(axis=1)]
-    pieces = pieces[:: max(1, len(pieces) // DETAIL_PIECES)]
     near = NEAR_OUTSIDE * float(np.linalg.norm(space.shape))
     cameras = []
     for elevation in np.radians(ELEVATIONS):
@@ -242,13 +238,10 @@ def _cameras_outside(space: FreeSpace) -> list[tuple[float, Camera]]:
             tan_y = math.tan(0.5 * OBJECT_YFOV)
             # Far enough for every piece to be in the image: z + |y|/tan and z + |x|/(tan · 4/3), plus 2 %.
             reach = np.maximum(np.abs(local[:, 1]) / tan_y, np.abs(local[:, 0]) / (tan_y * 4.0 / 3.0))
-            whole = 1.02 * float((reach + local[:, 2]).max())
-            for distance in whole * np.array(DISTANCES):
-                eye = space.to_world(target + distance * back)
-                camera = Camera(look_at(eye, space.to_world(target)), OBJECT_YFOV)
-                framed = float((reach + local[:, 2] < distance).mean())
-                seen = composition(space, camera, near)
-                cameras.append((_rounded(framed**3 * _outdoor_score(seen)), camera))
+            distance = 1.02 * float((reach + local[:, 2]).max())
+            eye = space.to_world(target + distance * back)
+            camera = Camera(look_at(eye, space.to_world(target)), OBJECT_YFOV)
+            cameras.append((_rounded(_outdoor_score(composition(space, camera, near))), camera))
     return cameras
 
 

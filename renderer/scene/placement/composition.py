@@ -34,7 +34,7 @@ class Composition:
     detail: float
     """Share that hits detail (`FreeSpace.detail`)."""
     surfaces: float
-    """Effective number of surfaces, background included: exp of the entropy of their shares."""
+    """Effective number of surfaces: exp of the entropy of their shares of the rays that hit."""
     largest: float
     """Share of the largest surface."""
     spread: float
@@ -65,7 +65,7 @@ def composition(space: FreeSpace, camera: Camera, near: float) -> Composition:
         near=float((distance < near).sum()) / hit.size,
         detail=float(space.detail.ravel()[voxel].sum()) / hit.size,
         surfaces=float(np.exp(-(shares * np.log(shares)).sum())),
-        largest=float(shares[1:].max()),
+        largest=sight.hit_fraction * float(shares.max()),
         spread=float(np.std(np.log(np.maximum(distance, 0.5)))),
         area=float(np.sqrt(np.where(front, distance**2 / tilt, 0.0).sum() / hit.size)),
         depth_ahead=float(np.where(np.isfinite(middle), middle, 0.0).mean() / np.median(distance)),
@@ -73,7 +73,7 @@ def composition(space: FreeSpace, camera: Camera, near: float) -> Composition:
 
 
 def _surface_shares(space: FreeSpace, sight: Sight) -> Float64[np.ndarray, " surfaces"]:
-    """Share of the rays on each surface: first the background, then planes and pieces of detail by albedo."""
+    """Share of the hits on each surface: planes, and pieces of detail, told apart by albedo too."""
     hit = sight.hits.hit
     voxel = sight.hits.voxel[hit]
     # Centres of the voxels, which on an axis-aligned plane do not vary as the hit points do.
@@ -92,4 +92,4 @@ def _surface_shares(space: FreeSpace, sight: Sight) -> Float64[np.ndarray, " sur
         [facing, place, np.floor(albedo / ALBEDO_STEP) @ [[1.0], [8.0], [64.0]]], axis=1
     ).astype(np.int64)
     _, counts = np.unique(labels, axis=0, return_counts=True)
-    return np.concatenate([[max(float((~hit).sum()), 1e-9)], counts]) / hit.size
+    return counts / counts.sum()

@@ -86,7 +86,7 @@ def sun_faces(
 
 
 def _longest_edges(scene: Scene, instance: Instance) -> np.ndarray:
-    """Of each triangle of an instance, world units."""
+    """The longest edge of each triangle of an instance, world units."""
     mesh = scene.meshes[instance.mesh]
     corners = transform_points(instance.to_world, mesh.positions)[mesh.triangles]
     return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).max(axis=1)

@@ -22,8 +22,8 @@ DARK_SHARE = 0.01
 """Share of the mean squared irradiance that is added to a receiver's own: a black point is not infinitely
 important."""
 LEAST_IMPORTANCE = 0.05
-"""Share of the mean importance of lit cells that is added to each. Light that seems to matter little is drawn
-seldom, but never not at all, so that the mean stays right and no VPL grows too bright."""
+"""Least share of the VPLs that is drawn by flux alone, whatever η is. Light that seems to matter little is
+drawn seldom, but never not at all, so that the mean stays right and no VPL grows too bright. A choice."""
 DEFINES = {
     "IMPORTANCE_RECEIVERS": RECEIVERS,
     "IMPORTANCE_SPREAD": SPREAD,
@@ -76,7 +76,7 @@ class VplImportancePass(FramePass):
         return inputs.parameters.density_importance > 0.0
 
     def draw(self, inputs: FrameInputs) -> None:
-        """Measure the importance of the light in the RSM, to the power of η."""
+        """Measure the importance of the light in the RSM, and mix it with its flux."""
         uniforms = {**inputs.camera.uniforms, **self._rsm.uniforms, "cell_count": self._cell_count}
         groups = -(-self._cell_count // 64)
         self._cells.dispatch(groups, **uniforms)

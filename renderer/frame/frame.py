@@ -82,7 +82,7 @@ class FrameSetup:
             rsm_resolution=rsm_resolution(view.lights, config.quality),
             importance_cells=importance_cells(view.lights),
             vpl_count=count,
-            interleave=config.quality.interleave_for(count),
+            interleave=config.quality.interleave_for(count, view.size),
             maps=VisibilityMapLayout.of(config),
             prior=config.auto,
             adaptation_frames=config.quality.adaptation_frames,

@@ -28,7 +28,8 @@ float sampling_weight(ivec2 texel, float flux) {
     if (density_importance > 0.0) {
         float mean = texelFetch(mean_importance, ivec2(0), 0).r;
         float own = texelFetch(importance, texel * IMPORTANCE_CELLS / RSM_RESOLUTION, 0).r;
-        weight *= pow((mean > 0.0 ? own / mean : 1.0) + LEAST_IMPORTANCE, density_importance);
+        float least = max(1.0 - density_importance, LEAST_IMPORTANCE);
+        weight *= density_importance * (mean > 0.0 ? own / mean : 1.0) + least;
     }
 #endif
     return weight;

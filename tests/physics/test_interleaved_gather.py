@@ -29,6 +29,7 @@ from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.light_faces import light_records
 from vpltune.renderer.scene.placement import resolve_camera_and_lights
 from vpltune.renderer.scene.scene import Camera, Light, look_at
+from vpltune.renderer.scene.sun_faces import SunGrid
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.metrics.view_metrics import energy_ratio, relmse
 
@@ -132,7 +133,9 @@ def drawn_gbuffer(gl_context, image, depth_and_normal, light=None) -> Resources:
 def inputs_of(resources: Resources) -> FrameInputs:
     bounds = np.array([[-1.0, -1, -1], [1, 1, 1]])
     camera = camera_uniforms(Camera(np.eye(4), 0.8), resources.texture("shared_irradiance").size, bounds)
-    return FrameInputs(camera, light_records((), bounds), ArtistParameters(), 1.0)
+    return FrameInputs(
+        camera, light_records((), bounds, SunGrid(1, (0.0, 0.0, 0.0))), ArtistParameters(), 1.0
+    )
 
 
 def listed(resources: Resources) -> int:

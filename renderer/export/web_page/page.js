@@ -413,7 +413,7 @@ class Frame {
     fill(this.importanceReceivers, vpl_importance_receivers, { ...this.cameraValues(camera), ...cells });
     const [receiver_position_valid, receiver_normal_irradiance] = this.importanceReceivers.textures;
     fill(this.importance, vpl_importance, { ...cells, receiver_position_valid, receiver_normal_irradiance });
-    fill(this.meanImportance, vpl_importance_mean, { importance: this.importance.textures[0] });
+    fill(this.meanImportance, vpl_importance_mean, { importance: this.importance.textures[0], cell_position_flux });
   }
 
   weightValues({ density_exponent, density_importance }) {

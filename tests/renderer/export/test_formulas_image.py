@@ -95,7 +95,7 @@ def placed(parameters: ArtistParameters, captured) -> tuple[Vpls, float]:
 def cast_map(vpl: dict, length: float, size: int, refinement: int) -> dict[str, np.ndarray]:
     """The map of one VPL, by rays through the boxes."""
     frame = visibility_maps.hemisphere_frame(vpl["normal"])
-    origin = visibility_maps.map_origin(vpl["position"], vpl["normal"], vpl["footprint"], length)
+    origin = visibility_maps.map_origin(vpl["position"], vpl["normal"], vpl["footprint"])
 
     def cast(side: int) -> tuple[np.ndarray, np.ndarray]:
         end, normal = np.zeros((side, side, 3)), np.zeros((side, side, 3))

@@ -158,7 +158,7 @@ def measured(gl_context, resources):
     return defines, {
         "cells": program("_cells", (*RSM_READS, both[1]), both[0]),
         "importance": program("", ("artist_parameters", *RSM_READS, *both), "vpl_importance"),
-        "factor": program("_factor", ("artist_parameters", *RSM_READS), "vpl_importance"),
+        "factor": program("_factor", ("artist_parameters", *RSM_READS, *both), "vpl_importance"),
     }
 
 

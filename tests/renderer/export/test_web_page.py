@@ -25,6 +25,7 @@ from vpltune.renderer.frame.disc_samples import NORMAL_REACH
 from vpltune.renderer.gpu.camera_uniforms import camera_uniforms
 from vpltune.renderer.scene.light_faces import light_records
 from vpltune.renderer.scene.scene import Camera
+from vpltune.renderer.scene.sun_faces import SunGrid
 from vpltune.tuner.fitting.fit_density import DISC_FOOTPRINT
 
 SOFTWARE_GL = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
@@ -319,7 +320,7 @@ def test_a_view_without_light_is_refused():
 def test_the_bundles_faces_and_camera_are_the_runtimes():
     scene, view = textured_room(), web_view("point", (16, 12))
     document = scene_bundle(scene, view, with_resolution(CONFIG, 64)).document
-    faces = light_records(view.lights, scene.bounds()).faces
+    faces = light_records(view.lights, scene.bounds(), SunGrid(64, (0.0, 0.0, 0.0))).faces
     for face, theirs in zip(faces, document["rsm"]["faces"], strict=True):
         np.testing.assert_array_equal(face["light_to_world"].T, np.float32(theirs["light_to_world"]))
     assert (

@@ -1,6 +1,6 @@
 // Clustered disc lights, part 1 of a Lloyd iteration: finds the nearest VPL of each sample.
 //
-// Reads: samples, VPLs, the scene length. Writes: owners, -1 for a dark sample. One invocation for each sample.
+// Reads: samples, VPLs, the scene length. Writes: the members of each VPL. One invocation for each sample.
 // Python: renderer/frame/passes/clustered_discs.py. Source: see common/clustered_discs.glsl.
 #include "common/scene_length.glsl"
 
@@ -15,7 +15,6 @@ layout(std430, binding = VIRTUAL_POINT_LIGHTS_BINDING) readonly buffer VirtualPo
 };
 
 uniform int vpl_count;
-uniform int sample_count;
 
 // A batch of VPLs: position, area (0 where dark); normal.
 shared vec4 positions_lit[64];
@@ -46,7 +45,8 @@ void main() {
         }
         barrier();
     }
-    if (index < sample_count) {
-        vpl_owners[index] = own.normal_area.w > 0.0 ? owner : -1;
+    // A dark sample belongs to no VPL.
+    if (index < sample_count && own.normal_area.w > 0.0 && owner >= 0) {
+        atomicOr(vpl_members[owner * member_words() + index / 32], 1u << uint(index % 32));
     }
 }

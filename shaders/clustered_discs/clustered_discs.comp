@@ -9,19 +9,21 @@ const float PI = 3.14159265358979;
 #include "common/clustered_discs.glsl"
 #include "common/clustered_discs_buffers.glsl"
 
-layout(local_size_x = 64) in;
+const int LANES = 32;  // A choice: most VPLs have fewer samples.
+
+layout(local_size_x = LANES) in;
 
 layout(std430, binding = VIRTUAL_POINT_LIGHTS_BINDING) buffer VirtualPointLights {
     VirtualPointLight virtual_point_lights[];
 };
 
-shared ClusterSums sums[64];
-shared float distances[64];
-shared int nearest_samples[64];
+shared ClusterSums sums[LANES];
+shared float distances[LANES];
+shared int nearest_samples[LANES];
 
 // Add up `sums` over the workgroup, into sums[0].
 void sum_lanes(int lane) {
-    for (int reach = 32; reach > 0; reach /= 2) {
+    for (int reach = LANES / 2; reach > 0; reach /= 2) {
         barrier();
         if (lane < reach) {
             sums[lane] = joined(sums[lane], sums[lane + reach]);
@@ -34,7 +36,7 @@ void sum_lanes(int lane) {
 int sample_nearest_to(int first_word, int lane, vec3 middle, vec3 normal) {
     float nearest = 1e30;
     int found = -1;
-    for (int word = lane; word < member_words(); word += 64) {
+    for (int word = lane; word < member_words(); word += LANES) {
         for (uint members = vpl_members[first_word + word]; members != 0u; members &= members - 1u) {
             int index = 32 * word + findLSB(members);
             VirtualPointLight one = vpl_samples[index];
@@ -49,7 +51,7 @@ int sample_nearest_to(int first_word, int lane, vec3 middle, vec3 normal) {
     }
     distances[lane] = nearest;
     nearest_samples[lane] = found;
-    for (int reach = 32; reach > 0; reach /= 2) {
+    for (int reach = LANES / 2; reach > 0; reach /= 2) {
         barrier();
         if (lane < reach) {
             int other = lane + reach;
@@ -70,7 +72,7 @@ void main() {
     vec3 before = virtual_point_lights[vpl_index].position_footprint.xyz;
     ClusterSums own = NO_SAMPLES;
     int first_word = vpl_index * member_words();
-    for (int word = lane; word < member_words(); word += 64) {
+    for (int word = lane; word < member_words(); word += LANES) {
         for (uint members = vpl_members[first_word + word]; members != 0u; members &= members - 1u) {
             own = with_sample(own, vpl_samples[32 * word + findLSB(members)], before);
         }

@@ -18,8 +18,8 @@ class VplVisibilityMapsPass(FramePass):
 
     The maps hold what imperfect shadow maps (Ritschel et al. 2008) hold. They are cast as rays and not
     splatted from points, so a map has no holes and needs few texels. Texels beside which one surface hides
-    another are cast once more, `refinement`² rays for each. Texels in whose direction no visible receiver lies
-    are not cast: nobody looks them up.
+    another are cast once more, `refinement`² rays for each. Texels that no visible receiver can look up are
+    not cast.
     """
 
     name = "vpl_visibility_maps"

@@ -35,7 +35,9 @@ uint group_of(vec3 normal, float depth) {
     vec3 size = abs(normal);
     int axis = size.x >= max(size.y, size.z) ? 0 : size.y >= size.z ? 1 : 2;
     uint side = normal[axis] > 0.0 ? 1u : 0u;
-    return (uint(-log(depth) * RECEIVER_DISTANCE_STEPS) * 3u + uint(axis)) * 2u + side + 1u;
+    // Rounding may take the depth of the near plane above 1.
+    uint steps = uint(max(-log(depth) * RECEIVER_DISTANCE_STEPS, 0.0));
+    return (steps * 3u + uint(axis)) * 2u + side + 1u;
 }
 
 // The slot of a group: its own, or a free one that it takes.

@@ -138,7 +138,7 @@ def left_out(config: TunedConfig) -> tuple[str, ...]:
     sentences = []
     if config.parameters.screen_space_strength > 0.0 and not config.parameters.vpls_are_discs:
         sentences.append("The screen-space near field is drawn by the runtime alone")
-    if config.quality.interleave > 1:
+    if config.quality.interleave != 1:
         sentences.append("Every pixel gathers every VPL here; only the runtime interleaves them")
     return tuple(sentences)
 

@@ -81,7 +81,7 @@ class FrameSetup:
             face_count=face_count(view.lights),
             rsm_resolution=rsm_resolution(view.lights, config.quality),
             vpl_count=count,
-            interleave=config.quality.interleave_for(count),
+            interleave=config.quality.interleave_for(count, view.size),
             maps=VisibilityMapLayout.of(config),
             prior=config.auto,
             adaptation_frames=config.quality.adaptation_frames,

@@ -15,8 +15,10 @@ from vpltune.renderer.scene.scene import Camera, Light, Scene, look_at
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.prior.scene_generator import generated_scene
 
-CONFIG = TunedConfig(ArtistParameters(vpl_count=48), quality=Quality(rsm_resolution=128))
-DISCS = replace(CONFIG, parameters=replace(CONFIG.parameters, lloyd_iterations=1))
+QUALITY = Quality(interleave=1, rsm_resolution=128)
+POINTS = TunedConfig(ArtistParameters(vpl_count=48, lloyd_iterations=0), quality=QUALITY)
+DISCS = replace(POINTS, parameters=replace(POINTS.parameters, lloyd_iterations=1))
+INTERLEAVED = replace(DISCS, quality=replace(QUALITY, interleave=4))
 SIZE = (50, 38)
 """No multiple of a tile."""
 
@@ -40,7 +42,7 @@ def boxes_of(drawn: DrawnFrame) -> np.ndarray:
 
 def test_every_receiver_lies_in_a_box(gl_context):
     """With its normal, to 1e-4 of the scene: positions are computed anew in float64."""
-    drawn = Runtime(colored_room(), context=gl_context).draw(room_view("spot", SIZE), CONFIG)
+    drawn = Runtime(colored_room(), context=gl_context).draw(room_view("spot", SIZE), POINTS)
     captured = drawn.capture()
     tolerance = 1e-4 * np.ptp(captured.position_world[captured.valid], axis=0).max()
     position, normal = (
@@ -52,7 +54,7 @@ def test_every_receiver_lies_in_a_box(gl_context):
     assert inside.all(-1).any(1).all()
 
 
-@pytest.mark.parametrize("config", [CONFIG, DISCS, replace(DISCS, quality=Quality(interleave=4))])
+@pytest.mark.parametrize("config", [POINTS, DISCS, INTERLEAVED])
 def test_images_are_the_same_to_the_last_bit(gl_context, monkeypatch, config):
     """As are the scene statistics, which read maps too."""
     (pruned, statistics), (whole, all_statistics) = drawn_both_ways(
@@ -90,7 +92,7 @@ def test_vpls_that_nothing_visible_faces_cast_nothing(gl_context, monkeypatch):
     light = Light("spot", np.full(3, 4.0), above, np.array([0.0, -1.0, 0.0]), 0.3, 0.5)
     camera = Camera(look_at(above, np.array([0.0, 0.0, 0.01])), 0.5)
     view = View("floor", "fitted", SIZE, camera, (light,))
-    (pruned, _), (whole, _) = drawn_both_ways(gl_context, monkeypatch, scene, view, CONFIG)
+    (pruned, _), (whole, _) = drawn_both_ways(gl_context, monkeypatch, scene, view, POINTS)
     nothing = whole.visibility_maps.distance.max()
     assert (whole.visibility_maps.distance < nothing).any()
     assert (pruned.visibility_maps.distance == nothing).all()

@@ -23,6 +23,7 @@ from vpltune.renderer.frame.passes.direct_light import DirectLightPass
 from vpltune.renderer.frame.passes.geometry import GeometryPass
 from vpltune.renderer.frame.passes.interleaved_filter import InterleavedFilterPass, NearFieldFilterPass
 from vpltune.renderer.frame.passes.material_resolve import MaterialResolvePass
+from vpltune.renderer.frame.passes.receiver_bounds import ReceiverBoundsPass
 from vpltune.renderer.frame.passes.reflective_shadow_map import ReflectiveShadowMapPass
 from vpltune.renderer.frame.passes.scene_statistics import SceneStatisticsPass
 from vpltune.renderer.frame.passes.screen_space_indirect import BLOCK as NEAR_FIELD_BLOCK
@@ -125,6 +126,7 @@ class Frame:
         if setup.maps.size:
             assert hierarchy is not None, "visibility maps are cast as rays"
             hierarchy.add_to(resources)
+            self._seen.append(ReceiverBoundsPass(resources))
             self._placed.append(VplVisibilityMapsPass(resources, setup.vpl_count, setup.maps, hierarchy))
         self._statistics: SceneStatisticsPass | None = None
         if setup.prior is not None:

@@ -211,7 +211,7 @@ def test_lloyd_iterations(gl_context):
     samples = vpl_rows(case["samples"])
     resources = Resources(gl_context)
     resources["vpl_samples"] = buffer_of(gl_context, samples)
-    resources["vpl_owners"] = gl_context.buffer(reserve=4 * len(samples))
+    resources["vpl_members"] = gl_context.buffer(bytes(4 * case["vpl_count"] * -(-len(samples) // 32)))
     resources["frame_statistics"] = buffer_of(gl_context, np.float32([1.0, 1.0, case["scene_length"], 1.0]))
     resources["virtual_point_lights"] = buffer_of(gl_context, samples[: case["vpl_count"]])
     owners = ComputeProgram(
@@ -219,14 +219,14 @@ def test_lloyd_iterations(gl_context):
         "clustered_discs/clustered_discs_owners",
         {"NORMAL_REACH": NORMAL_REACH},
         reads=("frame_statistics", "vpl_samples", "virtual_point_lights"),
-        writes=("vpl_owners",),
+        writes=("vpl_members",),
     )
     discs = ComputeProgram(
         resources,
         "clustered_discs/clustered_discs",
         {"NORMAL_REACH": NORMAL_REACH},
-        reads=("frame_statistics", "vpl_samples", "vpl_owners"),
-        writes=("virtual_point_lights",),
+        reads=("frame_statistics", "vpl_samples"),
+        writes=("virtual_point_lights", "vpl_members"),
     )
     for step in case["steps"]:
         groups = -(-len(samples) // 64)

@@ -24,6 +24,7 @@ PASSES = [
     "reflective_shadow_map",
     "virtual_point_lights",
     "direct_light",
+    "receiver_bounds",
     "vpl_visibility_maps",
     "vpl_gather",
     "interleaved_filter",
@@ -64,7 +65,7 @@ CASES = {
     "plain": (SMALL, without("light_pre_pass")),
     "no visibility maps": (
         SMALL.seen_by("transmittance"),
-        without("light_pre_pass", "vpl_visibility_maps"),
+        without("light_pre_pass", "receiver_bounds", "vpl_visibility_maps"),
     ),
     "full gather": (SMALL.with_full_gather(), without("light_pre_pass", "interleaved_filter")),
     "one VPL is not interleaved": (

@@ -172,7 +172,7 @@ def table(results: list[dict[str, Any]]) -> str:
     ]
     for result in results:
         ratios = [f"{result['ratios'][figure]:.2f}" if result["ratios"] else "–" for figure in FIGURES]
-        count = "1,024" if result["mode"] == "default" else str(FEW)
+        count = f"{ArtistParameters().vpl_count:,}" if result["mode"] == "default" else str(FEW)
         lines.append(f"| {result['name']} | {count} | {result['status']} | " + " | ".join(ratios) + " |")
     return "\n".join(lines)
 

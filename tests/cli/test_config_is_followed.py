@@ -74,6 +74,7 @@ BROUGHT_FORWARD = TunedConfig(
     ),
     {"scene": "box"},
     "transmittance",
+    quality=Quality(interleave=1),
     fit=FitNote("kept", "no gain"),
 )
 
@@ -230,8 +231,8 @@ def test_a_budget_is_forgotten_with_what_it_was_met_with():
 @pytest.mark.parametrize(
     ("name", "value", "rule"),
     [
-        ("interleave", "3", "must be one of 1, 2, 4, 8, got 3"),
-        ("interleave", "0", "must be one of 1, 2, 4, 8, got 0"),
+        ("interleave", "3", "must be one of auto, 1, 2, 4, 8, got 3"),
+        ("interleave", "0", "must be one of auto, 1, 2, 4, 8, got 0"),
         ("map_size", "3", "must be a whole number from 4 to 64, got 3"),
         ("map_size", "65", "must be a whole number from 4 to 64, got 65"),
         ("map_refinement", "16", "must be one of 1, 2, 4, 8, got 16"),

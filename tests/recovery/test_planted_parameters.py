@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from built_scenes import colored_room, room_view
 from own_reference import own_reference
+from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
@@ -18,7 +19,7 @@ from vpltune.tuner.surrogate.tabulated_gather import gather_tabulated, tabulate_
 from vpltune.tuner.surrogate.virtual_point_lights import gather_inputs
 from vpltune.tuner.surrogate.vpl_gather import FalloffParameters
 
-PLANTED = ArtistParameters(intensity=1.35, falloff_footprint=0.8, extinction_coefficient=0.7, vpl_count=256)
+PLANTED = point_vpls(intensity=1.35, falloff_footprint=0.8, extinction_coefficient=0.7, vpl_count=256)
 # The parameters of visibility maps are planted in test_planted_visibility.py.
 WITHOUT_MAPS = TunedConfig(visibility="transmittance")
 
@@ -83,7 +84,7 @@ def test_noise_is_not_fitted(planted_views):
             **{**vars(view.reference), "irradiance_a": halves[0], "irradiance_b": halves[1]}
         )
         noisy.append(CapturedView(view.view, reference, view.captured))
-    tuned = fit_placement(noisy, ArtistParameters(vpl_count=256)).parameters
+    tuned = fit_placement(noisy, point_vpls(vpl_count=256)).parameters
     for name in SearchSpace().names:
         assert getattr(tuned, name) == pytest.approx(getattr(PLANTED, name), rel=2e-2), name
 

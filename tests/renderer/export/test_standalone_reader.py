@@ -176,14 +176,17 @@ def test_the_quality_part_decides_the_maps():
 
 
 def test_what_is_left_out_is_said():
-    assert left_out(TunedConfig()) == ()
-    assert left_out(TunedConfig(quality=Quality(interleave=4))) == (
-        "Every pixel gathers every VPL here; only the runtime interleaves them",
-    )
-    near_field = with_parameters(TunedConfig(), screen_space_strength=1.0)
-    assert left_out(near_field) == ("The screen-space near field is drawn by the runtime alone",)
+    """Interleaving, where the runtime interleaves an image of that size, and the near field of points."""
+    small, large = (96, 72), (640, 480)
+    interleaved = "Every pixel gathers every VPL here; only the runtime interleaves them"
+    assert left_out(TunedConfig(), small) == ()
+    assert left_out(TunedConfig(), large) == (interleaved,)
+    assert left_out(TunedConfig(quality=Quality(interleave=4)), small) == (interleaved,)
+    assert left_out(TunedConfig(quality=Quality(interleave=1)), large) == ()
+    near_field = with_parameters(TunedConfig(), screen_space_strength=1.0, lloyd_iterations=0)
+    assert left_out(near_field, small) == ("The screen-space near field is drawn by the runtime alone",)
     # Discs withhold nothing that a near field would give back.
-    assert left_out(with_parameters(near_field, lloyd_iterations=8)) == ()
+    assert left_out(with_parameters(near_field, lloyd_iterations=8), small) == ()
 
 
 @pytest.mark.parametrize(

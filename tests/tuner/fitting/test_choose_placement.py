@@ -6,8 +6,9 @@ from dataclasses import replace
 import pytest
 from built_scenes import colored_room
 from converged_views import converged_view
+from point_vpls import point_vpls
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters, placement
+from vpltune.renderer.config.artist_parameters import placement
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -16,7 +17,7 @@ from vpltune.tuner.fitting.choose_placement import choose_placement, placement_n
 from vpltune.tuner.fitting.fit_views import robust_errors
 from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
 
-START = ArtistParameters(vpl_count=64)
+START = point_vpls(vpl_count=64)
 CONFIG = TunedConfig(START, quality=Quality(rsm_resolution=128))
 
 
@@ -28,7 +29,8 @@ def test_discs_beat_points_in_a_corner(gl_context):
     truth = [converged_view(runtime, light, CONFIG) for light in ("spot", "point", "wide_spot")]
     views = capture_views(runtime, CONFIG, tuple(v.view for v in truth), tuple(v.reference for v in truth))
     chosen = choose_placement(runtime, views, CONFIG, robust_errors(views))
-    assert set(chosen.costs) == {"points γ=1 η=0", "discs λ=2 γ=1 η=0.5", "discs λ=2 γ=1 η=1"}
+    discs = {f"discs λ=2 γ=1 η={importance:g}" for importance in IMPORTANCES}
+    assert set(chosen.costs) == {"points γ=1 η=0", *discs}
     assert chosen.costs[placement_name(chosen.parameters)] == min(chosen.costs.values()) < 1.0
     assert [view.view for view in chosen.views] == [view.view for view in views]
     assert all(view.drawn_with == CONFIG.with_parameters(chosen.parameters) for view in chosen.views)

@@ -149,7 +149,7 @@ def test_visibility_maps_are_cast_in_the_page(opened):
 
 @pytest.mark.parametrize("light", ["spot", "directional"])
 def test_cells_shine_as_discs_in_the_page(opened, light):
-    """In all but a share of `OF_DISCS` pixels: each step towards a cell's middle carries on how samples differ.
+    """In all pixels but a share of `OF_DISCS`: each step to a cell's middle carries on how samples differ.
 
     Rasterisers put edges of the RSM into other texels, which samples then follow. Between the runtime's own
     images from RSMs of 256² and 257², 16 to 22 pixels in a thousand differ so.

@@ -13,7 +13,7 @@ from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.evaluation.validation import between, candidates
-from vpltune.tuner.fitting.choose_placement import choose_placement, placement_name
+from vpltune.tuner.fitting.choose_placement import IMPORTANCES, choose_placement, placement_name
 from vpltune.tuner.fitting.fit_views import robust_errors
 from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
 

@@ -8,7 +8,7 @@ from built_scenes import colored_room
 from converged_views import converged_view
 from point_vpls import point_vpls
 
-from vpltune.renderer.config.artist_parameters import placement
+from vpltune.renderer.config.artist_parameters import LARGEST_DISC_COUNT, ArtistParameters, placement
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -50,6 +50,12 @@ def test_a_start_that_is_best_keeps_its_views(gl_context):
     chosen = choose_placement(runtime, (own,), CONFIG, robust_errors((own,)))
     assert chosen.parameters == START
     assert chosen.views == (own,)
+
+
+def test_a_placement_is_named_after_what_is_drawn():
+    """More VPLs than can be clustered are points, whatever the config asks for."""
+    names = [placement_name(ArtistParameters(vpl_count=LARGEST_DISC_COUNT + more)) for more in (0, 1)]
+    assert names == ["discs λ=2 γ=1 η=0.5", "points γ=1 η=0.5"]
 
 
 def test_candidates_are_the_placement_halfway_and_tuned():

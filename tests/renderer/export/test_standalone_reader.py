@@ -13,6 +13,7 @@ from PIL import Image
 
 from vpltune import Runtime
 from vpltune.__main__ import run
+from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, parse_config
 from vpltune.renderer.export.scene_bundle import left_out, scene_bundle, write_bundle
@@ -159,7 +160,7 @@ def test_a_bundle_is_json_that_describes_its_bytes(tmp_path):
 @pytest.mark.parametrize(("light", "texels"), [("spot", 1024), ("point", 512)])
 def test_a_config_without_a_resolution_leaves_it_to_the_number_of_faces(light, texels):
     """As the runtime does."""
-    view, config = room_view(light, (16, 12)), TunedConfig()
+    view, config = room_view(light, (16, 12)), TunedConfig(ArtistParameters(vpl_count=16))
     rsm = scene_bundle(colored_room(), view, config).document["rsm"]
     assert rsm["resolution"] == texels
     assert Runtime(colored_room()).draw(view, config).frame.rsm.resolution == texels

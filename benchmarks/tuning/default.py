@@ -112,12 +112,12 @@ def sources() -> dict[str, tuple[Callable[[], Scene], bool]]:
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
     """Ratios of the new default to the old one, medians and worst; a row for each scene's share of beads."""
     scenes = measured({"old": OLD, "default": DEFAULT}, sources(), progress)
-    beads = [
-        Row(f"{scene.name}.off_share", scene.figures["default"]["off_share"], "of the pixels", "the old default",
-            scene.figures["old"]["off_share"])
-        for scene in scenes
-    ]  # fmt: skip
-    return ratio_rows(scenes) + beads
+    return [*ratio_rows(scenes), *map(_bead_row, scenes)]
+
+
+def _bead_row(scene: Measured) -> Row:
+    old, new = (scene.figures[name]["off_share"] for name in ("old", "default"))
+    return Row(f"{scene.name}.off_share", new, "of the pixels", "the old default", old)
 
 
 def ratio_rows(scenes: list[Measured]) -> list[Row]:
@@ -192,7 +192,7 @@ def _figures(
 
 
 def _off_share(view: CapturedView) -> float:
-    """Share of the pixels that are off by more than the reference there and than its mean: beads at contacts."""
+    """Share of the pixels that are off by more than the reference and than its mean: beads at contacts."""
     valid = view.valid
     reference = view.reference.irradiance[valid].mean(axis=1)
     error = np.abs(view.captured.indirect_irradiance[valid].mean(axis=1) - reference)

@@ -136,12 +136,12 @@ def _visibility_maps(config: TunedConfig) -> dict[str, int]:
     }
 
 
-def left_out(config: TunedConfig) -> tuple[str, ...]:
-    """What of a config is not drawn outside the runtime, a sentence each."""
+def left_out(config: TunedConfig, frame_size: tuple[int, int]) -> tuple[str, ...]:
+    """What of a config is not drawn outside the runtime, a sentence each; `frame_size` is in pixels."""
     sentences = []
     if config.parameters.screen_space_strength > 0.0 and not config.parameters.vpls_are_discs:
         sentences.append("The screen-space near field is drawn by the runtime alone")
-    if config.quality.interleave != 1:
+    if config.quality.interleave_for(config.parameters.vpl_count, frame_size) > 1:
         sentences.append("Every pixel gathers every VPL here; only the runtime interleaves them")
     return tuple(sentences)
 

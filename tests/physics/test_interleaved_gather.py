@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
+from point_vpls import point_vpls
 from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
@@ -38,7 +39,8 @@ UNLIT = {"bevy-irradiancevolumeexample"}
 
 
 def captured(gl_context, scene, view, interleave, **parameters) -> CapturedFrame:
-    config = TunedConfig(ArtistParameters(**parameters), quality=Quality(interleave=interleave))
+    """What the runtime draws, by default with points."""
+    config = TunedConfig(point_vpls(**parameters), quality=Quality(interleave=interleave))
     return Runtime(scene, context=gl_context).capture(view, config)
 
 

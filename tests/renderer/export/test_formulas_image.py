@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from point_vpls import point_vpls
 from vector_file import BOUNDS, DIAGONAL, VECTORS, boxes, light_of
 
 from examples.formulas import visibility_maps
@@ -29,7 +30,7 @@ from vpltune.renderer.scene.scene import Camera, look_at
 RESOLUTION = 64
 LIGHT = VECTORS["rsm"]["light"]
 BOXES = VECTORS["boxes"]
-POINTS = ArtistParameters(
+POINTS = point_vpls(
     vpl_count=16,
     intensity=1.3,
     falloff_footprint=0.7,

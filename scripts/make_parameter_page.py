@@ -39,7 +39,8 @@ Settings that trade image quality for frame time. A key that is left out has its
 """
 
 QUALITY_MEANINGS = {
-    "interleave": "side of a pixel block that shares the VPLs out; 1 gathers every VPL at every pixel",
+    "interleave": "side of a pixel block that shares the VPLs out; 1 gathers every VPL at every pixel, "
+    "auto follows the frame's size",
     "map_size": "texels along the side of a VPL's visibility map",
     "map_refinement": "rays along the side of a map texel that a silhouette crosses",
     "rsm_resolution": "texels along the side of an RSM face",
@@ -82,7 +83,7 @@ def _parameter_row(spec: ParameterSpec) -> str:
 
 
 def _quality_row(name: str, member: dict[str, Any], meaning: str) -> str:
-    default = NO_DEFAULT.get(name) or f"{member['default']:g}"
+    default = NO_DEFAULT.get(name) or f"{member['default']}".removesuffix(".0")
     if "enum" in member:
         allowed = ", ".join(str(value) for value in member["enum"])
     elif "minimum" in member:

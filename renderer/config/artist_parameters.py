@@ -110,14 +110,14 @@ ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
     ParameterSpec(
         name="falloff_footprint",
         symbol="α",
-        # 1 is exact facing a disc, 0 in the edge of a corner. Between them, 0.5 keeps the energy within
-        # 1 % from 1,024 VPLs on and is within a tenth of the least error (`vpltune bench falloff_default`).
-        default=0.5,
+        # A disc is as wide as its cluster. Points do best at about half of that, between 1, which is exact
+        # facing a disc, and 0, which is so in the edge of a corner (`vpltune bench falloff_default`).
+        default=1.0,
         low=0.05,
         high=20.0,
         scale="log",
         unit="VPL footprints",
-        meaning="softens 1/d² near a point, as 1/(d² + (αℓ)²); of a cell's disc the radius, 1 its own",
+        meaning="radius of a clustered disc, 1 its own; softens 1/d² near a point, as 1/(d² + (αℓ)²)",
         fitted=True,
     ),
     ParameterSpec(
@@ -156,7 +156,7 @@ ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
     ParameterSpec(
         name="vpl_count",
         symbol="N",
-        default=1024,
+        default=512,
         low=1,
         high=65536,
         scale="log",
@@ -179,18 +179,18 @@ ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
     ParameterSpec(
         name="density_importance",
         symbol="η",
-        default=0.0,
+        default=0.5,
         low=0.0,
         high=1.0,
         scale="linear",
-        unit="exponent",
-        meaning="how far VPLs go where the camera would miss them: 0 not at all, 1 for the least error",
+        unit="share",
+        meaning="share of the VPLs that go where the camera would miss them; flux alone places the rest",
         fitted=False,
     ),
     ParameterSpec(
         name="lloyd_iterations",
         symbol="λ",
-        default=0,
+        default=2,
         low=0,
         high=16,
         scale="linear",

@@ -5,12 +5,16 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Literal
 
 from vpltune.renderer.errors import InputError
 
 INTERLEAVES = (1, 2, 4, 8)
 """Sides of a block. A choice: 8² pixels are one workgroup of the gather."""
+AUTO_INTERLEAVE = {1: 0, 2: 320 * 180, 4: 640 * 360}
+"""Pixels of a frame from which `auto` takes blocks of each side: the smallest frames of those measured at
+which the side adds less than a tenth to the error (docs/design_decisions.md). Side 8 adds more, and its
+filter takes the time that its gather saves."""
 MAP_REFINEMENTS = (1, 2, 4, 8)
 """Rays along the side of a refined texel. A choice."""
 SMALLEST_MAP, LARGEST_MAP = 4, 64
@@ -42,10 +46,10 @@ class Quality:
         InputError: a field is out of range.
     """
 
-    interleave: int = 1
+    interleave: int | Literal["auto"] = "auto"
     """One of `INTERLEAVES`: the VPLs are shared out among the pixels of a block of this side, and a filter
-    joins them. 1 gathers every VPL at every pixel, as the tuner's surrogate does. With fewer VPLs than pixels
-    in a block, blocks are smaller."""
+    joins them. 1 gathers every VPL at every pixel, as the tuner's surrogate does. `auto` follows the frame's
+    size by `AUTO_INTERLEAVE`. With fewer VPLs than pixels in a block, blocks are smaller."""
 
     map_size: int = 24
     """Texels along the side of a VPL's visibility map, in [4, 64]."""
@@ -68,20 +72,27 @@ class Quality:
 
     def check(self, where: str) -> None:
         """Raise InputError, naming `where`, if a field is out of range."""
-        _one_of(self.interleave, INTERLEAVES, f"{where}.interleave")
+        if self.interleave != "auto":
+            _one_of(self.interleave, INTERLEAVES, f"{where}.interleave", "auto")
         _whole(self.map_size, SMALLEST_MAP, LARGEST_MAP, f"{where}.map_size")
         _one_of(self.map_refinement, MAP_REFINEMENTS, f"{where}.map_refinement")
         if self.rsm_resolution is not None:
             _whole(self.rsm_resolution, SMALLEST_RSM, LARGEST_RSM, f"{where}.rsm_resolution")
         _number(self.adaptation_frames, 0.0, LONGEST_ADAPTATION, f"{where}.adaptation_frames")
 
-    def interleave_for(self, vpl_count: int) -> int:
+    def interleave_for(self, vpl_count: int, frame_size: tuple[int, int]) -> int:
         """The side of a block: `interleave`, or less where a block would have more pixels than VPLs.
+
+        `frame_size` is width and height in pixels.
 
         A pixel without a VPL of its own stays dark, and at the image's border a window of such pixels passes
         for unlit: one VPL shared among 64 pixels lost a tenth of its light.
         """
-        return max(side for side in INTERLEAVES if side <= self.interleave and side**2 <= max(1, vpl_count))
+        width, height = frame_size
+        most = self.interleave
+        if most == "auto":
+            most = max(side for side, pixels in AUTO_INTERLEAVE.items() if pixels <= width * height)
+        return max(side for side in INTERLEAVES if side <= most and side**2 <= max(1, vpl_count))
 
     def as_dict(self) -> dict[str, Any]:
         """The part as the file holds it; what is None is left out."""
@@ -128,7 +139,7 @@ def quality_schema(lloyd_iterations: dict[str, Any]) -> dict[str, Any]:
         "type": "object",
         "additionalProperties": False,
         "properties": {
-            "interleave": {"enum": list(INTERLEAVES), "default": default.interleave},
+            "interleave": {"enum": ["auto", *INTERLEAVES], "default": default.interleave},
             "map_size": {
                 "type": "integer",
                 "minimum": SMALLEST_MAP,
@@ -199,9 +210,11 @@ def _integer(value: Any) -> Any:
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
-def _one_of(value: Any, allowed: tuple[int, ...], where: str) -> None:
+def _one_of(value: Any, allowed: tuple[int, ...], where: str, word: str | None = None) -> None:
+    """`word` is named in the error as one more allowed value."""
     if isinstance(value, bool) or not isinstance(value, int) or value not in allowed:
-        raise InputError(f"{where}: must be one of {', '.join(map(str, allowed))}, got {value!r:.60}")
+        names = ", ".join(([word] if word else []) + [str(each) for each in allowed])
+        raise InputError(f"{where}: must be one of {names}, got {value!r:.60}")
 
 
 def _whole(value: Any, low: int, high: int, where: str) -> None:

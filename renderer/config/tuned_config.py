@@ -237,7 +237,7 @@ def _config(document: dict[str, Any], where: str) -> TunedConfig:
         parameters=_checked_parameters(parameters, where),
         provenance=_checked_provenance(document.get("provenance", {}), where),
         visibility=_checked_visibility(document.get("visibility", DEFAULT_VISIBILITY), where),
-        auto=_checked_auto(document, parameters["lloyd_iterations"], where),
+        auto=_checked_auto(document, where),
         quality=Quality.validated(quality, f"{where}: quality", _QUALITY_PARAMETERS),
         fit=None if fit is None else _checked_fit(fit, where),
         light=_checked_light(_object(document, "light", where), where),
@@ -279,17 +279,12 @@ def _checked_visibility(visibility: Any, where: str) -> Visibility:
     return visibility
 
 
-def _checked_auto(document: dict[str, Any], lloyd_iterations: Any, where: str) -> AutoPrior | None:
+def _checked_auto(document: dict[str, Any], where: str) -> AutoPrior | None:
     if "auto" not in document:
         return None
     visibility = document.get("visibility", DEFAULT_VISIBILITY)
     if visibility != "maps":
         raise InputError(f"{where}: key 'auto' goes with visibility 'maps', got {visibility!r}")
-    if lloyd_iterations != 0:
-        raise InputError(
-            f"{where}: key 'auto' goes with quality.lloyd_iterations 0, for its α is that of points, "
-            f"got {lloyd_iterations!r:.60}"
-        )
     return AutoPrior.validated(document["auto"], f"{where}: auto")
 
 

@@ -131,10 +131,10 @@ def _glsl_type(spec: ParameterSpec) -> str:
 
 
 def _quality_constants(config: TunedConfig) -> dict[str, int]:
-    """The quality settings that another engine can follow; 0 texels leave the resolution to it."""
+    """The quality settings that another engine can follow; 0 leaves interleaving or resolution to it."""
     quality = config.quality
     return {
-        "VPL_INTERLEAVE": quality.interleave,
+        "VPL_INTERLEAVE": 0 if quality.interleave == "auto" else quality.interleave,
         "VPL_MAP_SIZE": quality.map_size,
         "VPL_MAP_REFINEMENT": quality.map_refinement,
         "VPL_RSM_RESOLUTION": quality.rsm_resolution or 0,

@@ -16,7 +16,8 @@ from vpltune.renderer.scene.views import View, ray_directions_world
 class VisibilityMaps:
     """The surfaces that each VPL sees: a ray for each texel of its hemisphere, a block at a silhouette.
 
-    Kept as the GPU packs them, and unpacked when first asked for: of most frames nobody asks.
+    Texels that no receiver of the frame can look up are not cast, and hold the entry of a ray that met
+    nothing. Kept as the GPU packs them, and unpacked when first asked for: of most frames nobody asks.
     """
 
     texels: UInt32[np.ndarray, "vpls size size 2"]

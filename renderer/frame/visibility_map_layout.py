@@ -7,10 +7,9 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 TEXEL_BYTES = 8
 """A distance and a packed normal, or the place of finer texels: shaders/common/vpl_visibility.glsl."""
 VISIBILITY_LIFT = 0.01
-"""Rays start, and distances count, from a point lifted off the VPL's surface by this many footprints."""
-VISIBILITY_LEAST_LIFT = 1e-3
-"""And by this share of L at least. Interpolated RSM depth is off by about 1e-4 L, and a VPL behind its own
-surface would see nothing else."""
+"""Rays start, and distances count, from a point lifted off the VPL's surface by this many footprints. A VPL
+behind its own surface would see nothing else, and the RSM is off: by 1/256 of a texel, in which a rasteriser
+counts places, and by the rounding of its depth. A footprint is tens of texels."""
 VISIBILITY_CORNER_BITS = 7
 """Bits at the end of a map's distances that hold the corner mark (shaders/common/vpl_visibility.glsl). They
 change a distance by 1e-6 of itself."""
@@ -58,7 +57,6 @@ class VisibilityMapLayout:
             "VISIBILITY_MAP_SIZE": self.size,
             "VISIBILITY_MAP_REFINEMENT": self.refinement,
             "VISIBILITY_LIFT": VISIBILITY_LIFT,
-            "VISIBILITY_LEAST_LIFT": VISIBILITY_LEAST_LIFT,
             "VISIBILITY_CORNER_BITS": f"{VISIBILITY_CORNER_BITS}u",
             "VISIBILITY_NEAREST_VERTEX": f"{VISIBILITY_NEAREST_VERTEX}u",
             "VISIBILITY_FIRST_VERTEX": f"{VISIBILITY_FIRST_VERTEX}u",

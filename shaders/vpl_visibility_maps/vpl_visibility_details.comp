@@ -1,4 +1,4 @@
-// Visibility maps, part 3: at silhouettes, VISIBILITY_MAP_REFINEMENT² finer rays for each listed texel.
+// Visibility maps, part 4: at silhouettes, VISIBILITY_MAP_REFINEMENT² finer rays for each listed texel.
 //
 // Reads: the list of texels, VPLs, ray hierarchy. Writes: `visibility_details`.
 // Python: renderer/frame/passes/vpl_visibility_maps.py.

@@ -1,7 +1,7 @@
-// Visibility maps, part 2: marks the texels at concave corners, finds those at silhouettes, lists them, and writes the
-// indices of their blocks into the maps. One workgroup for each VPL.
+// Visibility maps, part 3: marks the texels at concave corners, finds those at silhouettes, lists them, and writes the
+// indices of their blocks into the maps, all for texels that a receiver may look up. One workgroup for each VPL.
 //
-// Reads and writes: `visibility_maps`. Writes: the list of texels.
+// Reads: `visibility_marks`. Reads and writes: `visibility_maps`. Writes: the list of texels.
 // Constants: VISIBILITY_BLOCKS, the number of blocks that there is room for. Further silhouettes stay coarse.
 // Python: renderer/frame/passes/vpl_visibility_maps.py.
 #include "common/scene_length.glsl"
@@ -13,6 +13,7 @@ shared uvec2 whole_map[TEXELS];  // a copy as cast: other invocations overwrite 
 #define SILHOUETTE_ENTRY(texel) whole_map[texel.y * VISIBILITY_MAP_SIZE + texel.x]
 #include "common/visibility_silhouette.glsl"
 #include "common/visibility_edges.glsl"
+#include "common/visibility_marks.glsl"
 #include "common/visibility_workgroup.glsl"
 
 layout(local_size_x = 64) in;
@@ -32,6 +33,9 @@ void main() {
     float farthest = VISIBILITY_FARTHEST * longest / scene_length;
     for (int i = int(gl_LocalInvocationIndex); i < TEXELS; i += 64) {
         ivec2 texel = ivec2(i % VISIBILITY_MAP_SIZE, i / VISIBILITY_MAP_SIZE);
+        if (!is_marked(vpl_index, texel, 0)) {
+            continue;
+        }
         visibility_maps[start + i].x |= corner_mark(texel, farthest);
 #if VISIBILITY_BLOCKS > 0
         if (!is_silhouette(texel, farthest)) {

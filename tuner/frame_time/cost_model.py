@@ -28,7 +28,7 @@ COUNTS = (32, 256)
 FRAMES = 5
 """Frames timed at each VPL count, of which the median is taken. A choice."""
 INTERLEAVES = (1, 2, 4)
-"""Values of `Quality.interleave` to choose from. A choice; the first one is the default."""
+"""Values of `Quality.interleave` to choose from. A choice; `default_choice` has the first one."""
 MAP_SIZES = (8, 16, 24)
 """Values of `Quality.map_size` to choose from. A choice."""
 RSM_DIVISORS = (1, 2, 4)
@@ -66,7 +66,7 @@ class CostModel:
 
     def costs(self, choice: Quality) -> Costs:
         """Costs of all passes of a frame with these settings; `choice.rsm_resolution` must not be None."""
-        gathered = self.interleave[choice.interleave]
+        gathered = self.interleave[block_side(choice)]
         mapped = self.map_size.get(choice.map_size, {})
         assert choice.rsm_resolution is not None, "a choice spells its RSM resolution out"
         shadowed = self.rsm_resolution[choice.rsm_resolution]
@@ -172,8 +172,14 @@ def costs_key(renderer: str, scene: Scene, views: Sequence[View], config: TunedC
 
 
 def default_choice(view: View) -> Quality:
-    """The default quality, with the RSM resolution that the runtime would pick for this view."""
-    return Quality(rsm_resolution=rsm_resolution(view.lights))
+    """The default quality with a full gather, and the RSM resolution that the runtime picks for this view."""
+    return Quality(interleave=INTERLEAVES[0], rsm_resolution=rsm_resolution(view.lights))
+
+
+def block_side(choice: Quality) -> int:
+    """Side of the pixel blocks that share the VPLs, which a choice to be timed never leaves to the frame."""
+    assert choice.interleave != "auto", "a choice spells its interleaving out"
+    return choice.interleave
 
 
 def rsm_resolutions(view: View) -> tuple[int, ...]:

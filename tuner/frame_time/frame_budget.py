@@ -33,6 +33,7 @@ from vpltune.tuner.frame_time.cost_model import (
     INTERLEAVES,
     MAP_SIZES,
     CostModel,
+    block_side,
     costs_key,
     default_choice,
     measured_cost_model,
@@ -161,7 +162,7 @@ class FrameBudget:
     def least_milliseconds(self) -> float:
         """The least budget [ms]: the fastest settings, with `LEAST_COUNT` VPLs for each pixel of a block."""
         return min(
-            self.costs.milliseconds(choice, LEAST_COUNT * choice.interleave**2) / AIM
+            self.costs.milliseconds(choice, LEAST_COUNT * block_side(choice) ** 2) / AIM
             for choice in self._choices(0.0)
         )
 
@@ -257,7 +258,7 @@ class FrameBudget:
         for index, choice in enumerate(choices):
             progress(index / len(choices))
             count = min(self.costs.count_within(choice, AIM * budget), parameter_spec("vpl_count").high)
-            if count < LEAST_COUNT * choice.interleave**2:
+            if count < LEAST_COUNT * block_side(choice) ** 2:
                 continue  # each pixel of a block needs VPLs of its own
             parameters = replace(self._start.parameters, vpl_count=int(count))
             config = self._config(choice, parameters)
@@ -281,7 +282,7 @@ class FrameBudget:
             InputError: no timing was within `OVER` of the budget.
         """
         chosen = self._start.parameters if parameters is None else parameters
-        least, most = LEAST_COUNT * choice.interleave**2, int(parameter_spec("vpl_count").high)
+        least, most = LEAST_COUNT * block_side(choice) ** 2, int(parameter_spec("vpl_count").high)
         expected = self.costs.count_within(choice, AIM * budget)
         wanted = expected if parameters is None else parameters.vpl_count
         slope, measured = self.costs.per_vpl(choice), {}

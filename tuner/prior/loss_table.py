@@ -31,8 +31,9 @@ from vpltune.tuner.surrogate.wide_vectors import wide_jit
 RECEIVERS = 2048
 """Largest number of pixels of a view that enter its table. A choice."""
 
-FOOTPRINT_PLACES = tuple(np.linspace(0.15, 0.75, 11).tolist())
-"""Nodes along the axis of α in the unit cube, from α = 0.12 to 4.5. A choice."""
+FOOTPRINT_PLACES = tuple(np.linspace(0.3, 0.7, 9).tolist())
+"""Nodes along the axis of α in the unit cube, from α = 0.3 to 3.3. A choice: 1, where a clustered disc has
+its own radius, is the middle one."""
 BIAS_PLACES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Nodes along the axis of β, over its whole range. A choice."""
 SOFTNESS_PLACES = tuple(np.linspace(0.0, 1.0, 7).tolist())

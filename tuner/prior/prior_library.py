@@ -44,16 +44,16 @@ NOISE_TARGET, MAX_SAMPLES = 3e-3, 1024
 """Limits of the references, see `reference_views`. A choice: coarser than the defaults there."""
 RSM_RESOLUTION = 512
 """Texels along the side of a face of the reflective shadow map. A choice."""
-CONFIG = TunedConfig(visibility="maps", quality=Quality(rsm_resolution=RSM_RESOLUTION))
-"""What scenes are captured with, at several VPL counts."""
+CONFIG = TunedConfig(visibility="maps", quality=Quality(interleave=1, rsm_resolution=RSM_RESOLUTION))
+"""What scenes are captured with, at several VPL counts: the defaults, and a full gather."""
 
 # Offsets of the point table. A choice.
 _ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.9, 0.4))
-ROTATIONS = {16: _ROTATIONS, 64: _ROTATIONS[:3], 256: _ROTATIONS[:2]}
+ROTATIONS = {32: _ROTATIONS[:3], 128: _ROTATIONS[:2], 512: _ROTATIONS[:1]}
 """VPL counts, and the rotations of the point table at each. A choice: few VPLs are noisy, and the prior must
 not learn the noise of a single placement."""
 
-CAPTURE_VERSION = 3
+CAPTURE_VERSION = 4
 """Increase it whenever a code change gives other statistics or losses for the same scene. Old cache entries
 are then ignored. Runtime options, quality and the layout of the maps are in the key anyway."""
 

@@ -28,7 +28,7 @@ from vpltune.tuner.evaluation.prepare_scene import (
 )
 from vpltune.tuner.evaluation.validation import candidates, validation_metrics
 from vpltune.tuner.evaluation.view_images import write_view_images
-from vpltune.tuner.fitting.fit_density import table_rotations
+from vpltune.tuner.fitting.fit_density import FEW_VPLS, table_rotations
 from vpltune.tuner.fitting.fit_status import Descent, FitStatus, Outcome
 from vpltune.tuner.fitting.search_space import SearchSpace
 from vpltune.tuner.frame_time.fit_budget import BudgetOptions
@@ -48,8 +48,6 @@ class FitOptions(SceneOptions):
 
     start: TunedConfig = field(default_factory=TunedConfig)
     """Where the fit begins, and the values of everything that is not fitted."""
-    density: bool = False
-    """Fits the placement density too, over several rotations of the point table: for few VPLs."""
     budget: BudgetOptions | None = None
     """Picks VPL count and quality settings that meet a frame time (`tuner.frame_time.fit_budget`)."""
     motion: bool = False
@@ -88,7 +86,7 @@ def fit(
         output: folder for tuned.json, views.json, metrics.json, images.npz and comparison.png.
         config: where the fit begins: a config file, "default" or "auto".
         progress: called with the name of a stage and the share of it that is done, in [0, 1].
-        options: fields of `FitOptions`: views, seed, bounces, camera, light, size, density …
+        options: fields of `FitOptions`: views, seed, bounces, camera, light, size …
 
     Raises:
         InputError: the config, the scene, its sidecar or the output folder cannot be used.
@@ -222,7 +220,6 @@ def _judged(
             prepared,
             start,
             output,
-            density=options.density,
             budget=options.budget,
             seed=options.seed,
             progress=lambda share: progress("fit", share),
@@ -283,7 +280,7 @@ def _validated(
     tried = candidates(start.parameters, found.base, found.tuned, auto)
     # The identity, which the runtime draws with, and rotations that the density was not fitted to.
     rotations = table_rotations(VALIDATION_ROTATIONS - 1, options.seed, held_out=True)
-    few = options.density or options.budget is not None
+    few = start.parameters.vpl_count <= FEW_VPLS or options.budget is not None
     metrics, captured = validation_metrics(
         prepared.runtime,
         prepared.validation,

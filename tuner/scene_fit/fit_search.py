@@ -10,7 +10,7 @@ from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene
 from vpltune.tuner.fitting.choose_placement import choose_placement
-from vpltune.tuner.fitting.fit_density import density_document, fit_density, with_discs
+from vpltune.tuner.fitting.fit_density import FEW_VPLS, density_document, fit_density, with_discs
 from vpltune.tuner.fitting.fit_placement import fit_placement, ready_views
 from vpltune.tuner.fitting.fit_status import Descent
 from vpltune.tuner.fitting.fit_views import robust_errors
@@ -43,7 +43,6 @@ def search(
     start: TunedConfig,
     output: Path,
     *,
-    density: bool,
     budget: BudgetOptions | None,
     seed: int,
     progress: Callable[[float], None],
@@ -54,8 +53,7 @@ def search(
         prepared: the scene; at least one of its fitted views is lit.
         start: where the search begins; has no prior.
         output: folder that a front of `budget` is written to.
-        density: fit the placement density over several rotations of the point table, for few VPLs.
-        budget: pick VPL count and quality settings that meet a frame time; overrides `density`.
+        budget: pick VPL count and quality settings that meet a frame time; overrides the start's.
         seed: selects pixels and rotations.
         progress: called with the share done, in [0, 1].
 
@@ -67,7 +65,7 @@ def search(
         met, descent, found = fit_to_budget(prepared, start, budget, output, seed=seed, progress=progress)
         start = replace(start, quality=met.quality)
         return _recaptured(prepared, views, start, met.parameters, descent, found, seed)
-    if density:
+    if start.parameters.vpl_count <= FEW_VPLS:
         fit = fit_density(prepared.runtime, views, start, seed=seed, progress=progress)
         found = {"density": density_document(prepared.runtime, views, start, fit, seed)}
         return _recaptured(prepared, views, start, fit.parameters, fit.descent, found, seed)

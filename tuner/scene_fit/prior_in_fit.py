@@ -29,8 +29,8 @@ def auto_candidate(
 ) -> ArtistParameters | None:
     """The parameters that the shipped prior sets for the start's placement: the mean over the fitted views.
 
-    None if the prior was not trained for this start, which has clustered disc lights or no visibility maps,
-    or if the start has a prior itself.
+    None if the prior was not trained for this start, which has points or no visibility maps, or if the start
+    has a prior itself.
 
     Args:
         prepared: its fitted views have scene statistics.
@@ -38,7 +38,7 @@ def auto_candidate(
         given: the config that the fit was asked to start from.
     """
     parameters = start.parameters
-    if parameters.lloyd_iterations > 0 or given.visibility != "maps" or given.auto is not None:
+    if not parameters.vpls_are_discs or given.visibility != "maps" or given.auto is not None:
         return None
     prior = read_config("auto").auto
     statistics = [

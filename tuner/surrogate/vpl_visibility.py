@@ -13,7 +13,6 @@ from vpltune.renderer.frame.capture import CapturedFrame, VisibilityMaps
 from vpltune.renderer.frame.visibility_map_layout import (
     FRAME_TURNS_OVER,
     VISIBILITY_FIRST_VERTEX,
-    VISIBILITY_LEAST_LIFT,
     VISIBILITY_LIFT,
     VISIBILITY_ROUNDING,
 )
@@ -147,8 +146,7 @@ def seen_share(overlap: Float[Array, "*shape"], parameters: VisibilityParameters
 
 def visibility_origin(vpls: VirtualPointLights) -> Float[Array, "vpls 3"]:
     """Origin of the rays of each VPL's map [L]. Twin in GLSL."""
-    lift = jnp.maximum(VISIBILITY_LIFT * vpls.footprint, VISIBILITY_LEAST_LIFT)
-    return vpls.position + lift[:, None] * vpls.normal
+    return vpls.position + VISIBILITY_LIFT * vpls.footprint[:, None] * vpls.normal
 
 
 @jax.jit

@@ -42,7 +42,7 @@ def fit(
         typer.Option(
             min=1,
             max=65536,
-            help="VPL count to fit for; up to 256, their placement density is fitted too.",
+            help="VPL count to fit for.",
             show_default=False,
         ),
     ] = None,
@@ -77,14 +77,12 @@ def fit(
     from vpltune.cli.quality_flags import with_flags
     from vpltune.cli.view_flags import camera_from_flags, light_from_flags
     from vpltune.renderer.config.tuned_config import read_config
-    from vpltune.tuner.fitting.fit_density import FEW_VPLS
     from vpltune.tuner.scene_fit.fit_scene import FitOptions, fit_scene
 
     start, overridden = with_flags(read_config(config), visibility=visibility)
     warn(overridden)
     options = FitOptions(
         start=with_vpl_count(start, vpl_count),
-        density=vpl_count is not None and vpl_count <= FEW_VPLS,
         budget=budget_from_flags(vpl_count, budget_ms, pareto, frame_size),
         motion=motion,
         views=views,

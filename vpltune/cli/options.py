@@ -38,9 +38,9 @@ VisibilityOption = Annotated[
     typer.Option(help="What occludes VPLs; overrides the config.", show_default=False),
 ]
 InterleaveOption = Annotated[
-    int | None,
+    str | None,
     typer.Option(
-        metavar="1|2|4|8",
+        metavar="auto|1|2|4|8",
         help="Divide the VPLs among the pixels of NxN blocks, which is faster; overrides the config.",
         show_default=False,
     ),

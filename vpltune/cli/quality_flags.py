@@ -9,14 +9,15 @@ from vpltune.renderer.errors import InputError
 
 
 def with_flags(
-    config: TunedConfig, *, visibility: Visibility | None = None, **quality: int | None
+    config: TunedConfig, *, visibility: Visibility | None = None, **quality: int | str | None
 ) -> tuple[TunedConfig, tuple[str, ...]]:
     """Override values of a config by flags.
 
     Args:
         config: the config that was read.
         visibility: None keeps the config's own.
-        quality: fields of `Quality`; None keeps the config's own.
+        quality: fields of `Quality`, as numbers or as words of the command line; None keeps the config's
+            own.
 
     Returns:
         The config, and a sentence for each value other than the default that a flag overrides.
@@ -25,10 +26,14 @@ def with_flags(
         InputError: a value is out of range, or the config has a prior that was trained with another
             visibility.
     """
-    given: dict[str, Any] = {name: value for name, value in quality.items() if value is not None}
+    given: dict[str, Any] = {
+        name: int(value) if isinstance(value, str) and value.isdecimal() else value
+        for name, value in quality.items()
+        if value is not None
+    }
     for name, value in given.items():
         try:
-            Quality(**{name: value})
+            Quality.validated({name: value}, "quality")
         except InputError as error:
             rule = str(error).partition(": ")[2]
             raise InputError(f"--{name.replace('_', '-')}: {rule}") from error

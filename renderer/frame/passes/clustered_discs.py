@@ -37,21 +37,22 @@ class ClusteredDiscsPass(FramePass):
     def _compiled(self) -> tuple[ComputeProgram, ComputeProgram]:
         """Compiled when they are first needed: points need none."""
         resources, defines = self._resources, {"NORMAL_REACH": NORMAL_REACH}
-        resources["vpl_owners"] = resources.context.buffer(reserve=4 * sample_count(self._vpl_count))
+        words = self._vpl_count * -(-sample_count(self._vpl_count) // 32)
+        resources["vpl_members"] = resources.context.buffer(bytes(4 * words))
         self._programs = (
             ComputeProgram(
                 resources,
                 "clustered_discs/clustered_discs_owners",
                 defines,
                 reads=("frame_statistics", "vpl_samples", "virtual_point_lights"),
-                writes=("vpl_owners",),
+                writes=("vpl_members",),
             ),
             ComputeProgram(
                 resources,
                 "clustered_discs/clustered_discs",
                 defines,
-                reads=("frame_statistics", "vpl_samples", "vpl_owners"),
-                writes=("virtual_point_lights",),
+                reads=("frame_statistics", "vpl_samples"),
+                writes=("virtual_point_lights", "vpl_members"),
             ),
         )
         return self._programs

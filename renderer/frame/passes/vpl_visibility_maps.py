@@ -1,7 +1,8 @@
 """VPL visibility maps: the surfaces every VPL sees, in a small hemispherical map, cast anew each frame."""
 
+from vpltune.renderer.config.artist_parameters import parameter_spec
 from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
-from vpltune.renderer.frame.visibility_map_layout import TEXEL_BYTES, VisibilityMapLayout
+from vpltune.renderer.frame.visibility_map_layout import MAP_READS, TEXEL_BYTES, VisibilityMapLayout
 from vpltune.renderer.gpu.gpu_program import ComputeProgram
 from vpltune.renderer.gpu.ray_hierarchy import RAY_DEFINES, RAY_READS, RayHierarchy
 from vpltune.renderer.gpu.render_targets import EMPTY_DISPATCH
@@ -9,14 +10,17 @@ from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.gpu.shader_library import MOST_WORKGROUPS
 
 _CAST_READS = (*RAY_READS, "frame_statistics", "virtual_point_lights")
+_MARKS_BYTES = 8
+"""Bytes of the marks of a map's row."""
 
 
 class VplVisibilityMapsPass(FramePass):
-    """VPLs, ray hierarchy → one map of surfaces for each VPL, finer at silhouettes.
+    """VPLs, ray hierarchy, receiver bounds → one map of surfaces for each VPL, finer at silhouettes.
 
     The maps hold what imperfect shadow maps (Ritschel et al. 2008) hold. They are cast as rays and not
     splatted from points, so a map has no holes and needs few texels. Texels beside which one surface hides
-    another are cast once more, `refinement`² rays for each.
+    another are cast once more, `refinement`² rays for each. Texels that no visible receiver can look up are
+    not cast.
     """
 
     name = "vpl_visibility_maps"
@@ -34,19 +38,27 @@ class VplVisibilityMapsPass(FramePass):
         detail_texels = max(1, blocks * layout.refinement**2)
         resources["visibility_details"] = context.buffer(reserve=detail_texels * TEXEL_BYTES)
         resources["visibility_edges"] = context.buffer(reserve=len(EMPTY_DISPATCH) + 4 * blocks)
+        resources["visibility_marks"] = context.buffer(reserve=vpl_count * layout.size * _MARKS_BYTES)
         defines = {**RAY_DEFINES, **layout.defines, "VISIBILITY_BLOCKS": blocks}
+        self._marks = ComputeProgram(
+            resources,
+            "vpl_visibility_maps/vpl_visibility_marks",
+            {**layout.defines, "DISC_LARGEST_FALLOFF": parameter_spec("falloff_footprint").high},
+            reads=("frame_statistics", "virtual_point_lights", "receiver_bounds", *MAP_READS),
+            writes=("visibility_marks",),
+        )
         self._maps = ComputeProgram(
             resources,
             "vpl_visibility_maps/vpl_visibility_maps",
             defines,
-            reads=(*_CAST_READS, "visibility_details"),
+            reads=(*_CAST_READS, "visibility_details", "visibility_marks"),
             writes=("visibility_maps",),
         )
         self._edges = ComputeProgram(
             resources,
             "vpl_visibility_maps/vpl_visibility_edges",
             defines,
-            reads=("frame_statistics", "visibility_details"),
+            reads=("frame_statistics", "visibility_details", "visibility_marks"),
             writes=("visibility_maps", "visibility_edges"),
         )
         self._refines = blocks > 0
@@ -66,6 +78,7 @@ class VplVisibilityMapsPass(FramePass):
         columns = min(self._vpl_count, MOST_WORKGROUPS)
         groups = (columns, -(-self._vpl_count // columns))
         uniforms = {"longest": inputs.scene_diagonal, "vpl_count": self._vpl_count}
+        self._marks.dispatch(*groups, vpl_count=self._vpl_count)
         self._maps.dispatch(*groups, **uniforms)
         self._resources.write("visibility_edges", EMPTY_DISPATCH)
         self._edges.dispatch(*groups, **uniforms)

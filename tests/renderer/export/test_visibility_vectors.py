@@ -183,6 +183,8 @@ def test_maps_are_cast_like_this(gl_context):
     hierarchy.add_to(resources)
     resources["virtual_point_lights"] = buffer_of(gl_context, vpl_rows(VPL))
     resources["frame_statistics"] = buffer_of(gl_context, np.float32([1.0, 1.0, LENGTH, 1.0]))
+    # More boxes than there is room for: every texel is cast.
+    resources["receiver_bounds"] = buffer_of(gl_context, np.uint32([1, 0, 0, 0]))
     light = light_of(VECTORS["rsm"]["light"])
     VplVisibilityMapsPass(resources, 1, LAYOUT, hierarchy).draw(inputs_of(light, ArtistParameters()))
     texels = np.frombuffer(resources.read("visibility_maps"), np.uint32).reshape(SIZE, SIZE, 2)

@@ -61,7 +61,7 @@ def check_partition(gl_context, thickness: str, parameters: ArtistParameters) ->
     assert leak.max() <= 0.01 * usual
     maps = far.visibility_maps
     assert maps is not None
-    assert (maps.corner > 0).mean() > 0.1
+    assert (maps.corner > 0).mean() > 0.01
     receivers, vpls = gather_inputs(far)
     twin = lit_by(far, parameters, map_visibility(far, receivers, vpls, parameters))
     assert np.abs(twin - leak).max() <= 1e-3 * usual

@@ -113,7 +113,7 @@ def test_a_corner_has_a_closed_form():
         vpl = VirtualPointLights(
             jnp.array([[0.0, 0.0, -1e-5]]), jnp.array([[0.0, 0.0, 1.0]]), jnp.array([1e-3]), jnp.ones((1, 3))
         )
-        normal = np.tile(np.float32([0.0, 0.0, -1.0]), (len(places), 1))
+        normal = np.tile(np.array([0.0, 0.0, -1.0], np.float32), (len(places), 1))
         seen = vpl_visibility(
             Receivers(jnp.asarray(places, jnp.float32), jnp.asarray(normal)),
             vpl,

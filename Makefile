@@ -12,7 +12,7 @@ WORKERS ?= 2
 PYTHONS ?= 3.11 3.12 3.13
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all test-pythons bench lint docs clean requirements schema
+.PHONY: help setup demo test test-all test-pythons bench figures lint docs clean requirements schema
 .DELETE_ON_ERROR:
 
 help: ## list the targets
@@ -34,6 +34,10 @@ test-pythons: setup ## the quick tests on each Python of PYTHONS that is here
 
 bench: setup ## the benchmarks
 	@$(BIN)/vpltune bench all
+
+# Hours; goes on where it was. ONLY=name runs one command of docs/figures.toml.
+figures: setup ## run every command that a figure in a document names, and say which figures changed
+	@$(BIN)/python scripts/figures.py $(if $(ONLY),--only $(ONLY))
 
 lint: setup ## style, format, import rules, docstrings, comments and types
 	@$(BIN)/ruff check

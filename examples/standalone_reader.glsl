@@ -99,8 +99,12 @@ float shadow(int light, vec3 position, vec3 normal, vec3 towards) {
     int chosen = 0;
     float most = -2.0;
     for (int i = 0; i < faces.length(); ++i) {
-        float ahead = -normalize((faces[i].to_face * vec4(position, 1.0)).xyz).z;
-        if (int(faces[i].extent_light.z) == light && ahead > most) { most = ahead; chosen = i; }
+        if (int(faces[i].extent_light.z) != light) continue;
+        vec3 place = (faces[i].to_face * vec4(position, 1.0)).xyz;
+        // Of a sun's faces, each within the one before, the last that shows the place 3 texels from its border.
+        bool shown = all(lessThan(abs(place.xy), faces[i].extent_light.xy * (1.0 - 6.0 / float(face_size))));
+        float ahead = faces[i].extent_light.w > 0.0 ? float(shown) - 2.0 : -normalize(place).z;
+        if (ahead > most || (shown && faces[i].extent_light.w > 0.0)) { most = ahead; chosen = i; }
     }
     Face face = faces[chosen];
     bool flat_face = face.extent_light.w > 0.0;

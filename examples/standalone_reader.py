@@ -66,10 +66,15 @@ def pixels(texture):  # [height, width, 4], bottom row first
 
 def light_maps(surfaces, rsm):  # the atlas: position, depth, triangle's normal, area, flux, 1
     atlas, size = np.zeros((*rsm["atlas"], 12)), rsm["resolution"]
-    for face in rsm["faces"]:
+    for face, finer in zip(rsm["faces"], [*rsm["faces"][1:], {"light": -1}], strict=True):
         to_world, (row, column) = np.array(face["light_to_world"]), face["origin"]
         maps = surfaces.seen((size, size), to_world, face["extent"], face["light"], face["orthographic"])
-        atlas[row : row + size, column : column + size] = np.dstack([pixels(texture) for texture in maps])
+        tile = np.dstack([pixels(texture) for texture in maps])
+        if face["orthographic"] and finer["light"] == face["light"]:  # nested in it: carries the flux there
+            to_finer = np.array(finer["light_to_world"])
+            place = (tile[..., :3] - to_finer[:3, 3]) @ to_finer[:3, :2]
+            tile[(np.abs(place) < finer["extent"]).all(-1), 8:11] = 0.0
+        atlas[row : row + size, column : column + size] = tile
     return atlas
 
 

@@ -15,7 +15,7 @@ int block_start(float number) { return vpls.length() / 3 * map_texels + int(numb
 
 // The origin of a VPL's rays, lifted off its own surface.
 vec3 map_origin(int vpl) {
-    return vpls[vpl].xyz + vpls[vpl + 1].xyz * max(0.01 * vpls[vpl].w, 1e-3 * scene_length);
+    return vpls[vpl].xyz + vpls[vpl + 1].xyz * (0.01 * vpls[vpl].w);
 }
 
 // Columns: two tangents and the normal (Duff et al. 2017).

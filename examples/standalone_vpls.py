@@ -20,7 +20,9 @@ def virtual_point_lights(atlas, seen, bundle):
     parameters, rules = bundle["config"]["parameters"], bundle["clustered_discs"]
     weight = np.where(flux > 0, flux ** parameters["density_exponent"], 0)
     if bundle["vpl_importance"]["cells"] > 0:
-        weight *= importance(atlas, seen, bundle) ** parameters["density_importance"]
+        share = parameters["density_importance"]
+        least = max(1.0 - share, bundle["vpl_importance"]["least"])
+        weight *= share * importance(atlas, seen, bundle) + least
     count = parameters["vpl_count"]
     if rules["steps"] == 0:
         vpls = drawn(atlas, weight, bundle, count)
@@ -33,7 +35,7 @@ def virtual_point_lights(atlas, seen, bundle):
 
 
 def importance(atlas, seen, bundle):
-    """For each texel, how much error the image would have if its light were drawn too seldom.
+    """For each texel, how much error the image would have if its light were drawn too seldom; 1 in the mean.
 
     Importance cells, each summarised from 16 texels, light some points of the image, without visibility. The
     relative error is least if a texel's probability is ∝ flux · sqrt(Σ f² / (E² + bound)), summed over the
@@ -70,7 +72,8 @@ def importance(atlas, seen, bundle):
     received = (form @ total)[:, 0]
     weight = 1 / (received**2 / (rules["dark_share"] * (received**2).mean()) + 1)
     missed = np.sqrt(weight @ form**2)
-    share = (missed / missed[missed > 0].mean() + rules["least"]).reshape(shape)
+    mean = (total[:, 0] * missed)[straight > 1e-4].sum() / total[straight > 1e-4].sum()
+    share = (missed / mean if mean > 0 else np.ones(len(missed))).reshape(shape)
     row, column = (np.arange(side) * cells // size for side in atlas.shape[:2])
     return share[np.ix_(row, column)]
 

@@ -317,7 +317,7 @@ def diagonal() -> float:
 
 def _cast(vpl: dict, size: int) -> tuple[np.ndarray, np.ndarray]:
     frame = visibility_maps.hemisphere_frame(vpl["normal"])
-    origin = visibility_maps.map_origin(vpl["position"], vpl["normal"], vpl["footprint"], LENGTH)
+    origin = visibility_maps.map_origin(vpl["position"], vpl["normal"], vpl["footprint"])
     end, normal = np.zeros((size, size, 3)), np.zeros((size, size, 3))
     for row, column in np.ndindex(size, size):
         axis = visibility_maps.texel_axis(np.float64(column), np.float64(row), size)
@@ -337,7 +337,7 @@ def _visibility() -> dict[str, Any]:
     vpl = map_vpl()
     maps = cast_map(vpl)
     frame = visibility_maps.hemisphere_frame(vpl["normal"])
-    origin = visibility_maps.map_origin(vpl["position"], vpl["normal"], vpl["footprint"], LENGTH)
+    origin = visibility_maps.map_origin(vpl["position"], vpl["normal"], vpl["footprint"])
     normals = [[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [0.48, -0.6, 0.64], [0.36, 0.48, -0.8]]
     row, column = np.meshgrid(np.arange(4.0), np.arange(4.0), indexing="ij")
     seen = []

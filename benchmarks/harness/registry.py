@@ -2,7 +2,7 @@
 
 import ast
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from benchmarks.harness.row import Row
@@ -16,9 +16,12 @@ def benchmark_names() -> tuple[str, ...]:
     return tuple(sorted(_modules()))
 
 
-def run_benchmark(name: str, progress: Callable[[str, float], None]) -> list[Row]:
-    """Run the benchmark `name`, one of `benchmark_names()`; it calls `progress` with a stage and a share."""
-    return importlib.import_module(_modules()[name]).rows(progress)
+def run_benchmark(name: str, progress: Callable[[str, float], None]) -> Iterator[Row]:
+    """Run the benchmark `name`, one of `benchmark_names()`; it calls `progress` with a stage and a share.
+
+    Some yield each row as soon as it is measured, others all at the end.
+    """
+    yield from importlib.import_module(_modules()[name]).rows(progress)
 
 
 def _modules() -> dict[str, str]:

@@ -30,6 +30,9 @@ OUTSIDE_SCENES = {
 }
 """Folder and file of each third-party scene."""
 
+MITSUBA_SCENES = {"bitterli-living-room": "scene.xml", "bitterli-staircase2": "scene.xml"}
+"""Folder and file of each third-party scene that must be imported."""
+
 
 def own_scene(name: str) -> Path:
     """The file of the shipped scene `name`."""

@@ -1,4 +1,4 @@
-"""Why α is 0.5 by default: the error and the energy of different α at 1,024 VPLs.
+"""Why α is 0.5 for points: the error and the energy of different α at 1,024 of them.
 
 The images are compared with one of 32,768 VPLs at α = 0.25, which has next to no noise and loses next to no
 energy. Neither visibility nor the path tracer is involved: the benchmark measures the point approximation
@@ -6,6 +6,7 @@ alone.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,10 +23,9 @@ from vpltune.tuner.metrics.view_metrics import energy_ratio, relmse
 ALPHAS = (0.25, 0.5, 0.7, 1.0)
 """Values of α to compare. A choice."""
 VPLS = 1_024
-"""VPLs of the compared images: the default count."""
-CONVERGED = TunedConfig(
-    ArtistParameters(vpl_count=32_768, falloff_footprint=0.25), visibility="transmittance"
-)
+"""VPLs of the compared images. A choice."""
+POINTS = ArtistParameters(vpl_count=VPLS, density_importance=0.0, lloyd_iterations=0)
+CONVERGED = TunedConfig(replace(POINTS, vpl_count=32_768, falloff_footprint=0.25), visibility="transmittance")
 """The config of the image that the others are compared with."""
 ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.15, 0.45))
 """Rotations of the point table, over which errors are averaged. A choice."""
@@ -44,7 +44,7 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
         runtime = Runtime(scene, context=context)
         converged = _irradiance(runtime, view, CONVERGED, (0.0, 0.0))
         for alpha in ALPHAS:
-            config = CONVERGED.with_parameters(ArtistParameters(vpl_count=VPLS, falloff_footprint=alpha))
+            config = CONVERGED.with_parameters(replace(POINTS, falloff_footprint=alpha))
             for rotation in ROTATIONS:
                 image = _irradiance(runtime, view, config, rotation)
                 figures[alpha].append((relmse(image, converged), energy_ratio(image, converged)))

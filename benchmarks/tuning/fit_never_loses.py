@@ -20,6 +20,7 @@ from typing import Any
 
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import REPOSITORY, present_scenes
+from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.renderer.files.strict_json import strict_json
 from vpltune.tuner.evaluation.guard import UNSEEN
@@ -114,7 +115,6 @@ def program_digest() -> str:
 
 def _measure(work: tuple[Cell, Path]) -> str:
     # Imported here, in the process that fits.
-    from vpltune.renderer.config.artist_parameters import ArtistParameters
     from vpltune.renderer.config.tuned_config import TunedConfig
     from vpltune.renderer.export.glb_writer import write_glb
     from vpltune.tuner.prior.scene_generator import generated_scene
@@ -161,7 +161,7 @@ def table(results: list[dict[str, Any]]) -> str:
     ]
     for result in results:
         ratios = [f"{result['ratios'][figure]:.2f}" if result["ratios"] else "–" for figure in FIGURES]
-        count = "1,024" if result["mode"] == "default" else str(FEW)
+        count = f"{ArtistParameters().vpl_count:,}" if result["mode"] == "default" else str(FEW)
         lines.append(f"| {result['name']} | {count} | {result['status']} | " + " | ".join(ratios) + " |")
     return "\n".join(lines)
 

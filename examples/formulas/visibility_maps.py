@@ -8,7 +8,6 @@ import numpy as np
 from examples.formulas.vectors import dot, length, unit
 
 LIFT = 0.01
-LEAST_LIFT = 1e-3
 NOTHING = 2.0
 FARTHEST = 1.5
 LEAST_OVERLAP = 2e-3
@@ -23,9 +22,9 @@ def hemisphere_frame(normal: np.ndarray) -> np.ndarray:
     return np.array([[1.0 + s * x * x * a, s * b, -s * x], [b, s + y * y * a, -y], normal])
 
 
-def map_origin(position, normal, footprint: float, scene_length: float) -> np.ndarray:
+def map_origin(position, normal, footprint: float) -> np.ndarray:
     """Where rays start, in the world: a little off the VPL's surface."""
-    return position + normal * max(LIFT * footprint, LEAST_LIFT * scene_length)
+    return position + normal * LIFT * footprint
 
 
 def hemi_octahedral_encode(direction: np.ndarray) -> np.ndarray:
@@ -96,7 +95,7 @@ def vpl_visibility(position, normal, vpl: dict, maps: dict, scene_length: float,
             `block_end`, `block_normal` [blocks, refinement, refinement, 3].
     """
     frame = hemisphere_frame(vpl["normal"])
-    origin = map_origin(vpl["position"], vpl["normal"], vpl["footprint"], scene_length)
+    origin = map_origin(vpl["position"], vpl["normal"], vpl["footprint"])
     receiver = frame @ (position - origin) / scene_length
     receiver_normal = frame @ normal
     if not receiver[2] > 0.0 or not dot(receiver, receiver_normal) < 0.0:

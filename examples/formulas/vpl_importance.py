@@ -51,16 +51,18 @@ def cell_form(position, normal, cells: dict) -> np.ndarray:
     return np.where(cells["flux"].reshape(-1) > 0.0, form, 0.0)
 
 
-def importance_factor(position, normal, cells: dict, exponent: float) -> tuple[np.ndarray, np.ndarray]:
+def importance_factor(position, normal, cells: dict, share_drawn: float) -> tuple[np.ndarray, np.ndarray]:
     """Irradiance estimates of the receivers [receivers], and the factor of each cell's sampling weight.
 
-    `exponent` is η; receivers are surface points that stand for the image, those without a surface left out.
+    `share_drawn` is η. Receivers are surface points that stand for the image.
     """
     form = cell_form(position, normal, cells)
     estimate = form @ cells["flux"].reshape(-1)
     dark = DARK_SHARE * (estimate**2).mean()
     weight = 1.0 / (estimate**2 / dark + 1.0) if dark > 0.0 else np.zeros(len(estimate))
     importance = np.sqrt((weight[:, None] * form**2).sum(axis=0))
-    counted = importance[importance > 0.0]
-    share = importance / counted.mean() if len(counted) else np.ones(len(importance))
-    return estimate, ((share + LEAST_IMPORTANCE) ** exponent).reshape(cells["flux"].shape)
+    flux = cells["flux"].reshape(-1)
+    missed = (flux * importance).sum()
+    share = importance * flux.sum() / missed if missed > 0.0 else np.ones(len(importance))
+    factor = share_drawn * share + max(1.0 - share_drawn, LEAST_IMPORTANCE)
+    return estimate, factor.reshape(cells["flux"].shape)

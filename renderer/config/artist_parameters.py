@@ -183,8 +183,8 @@ ARTIST_PARAMETERS: tuple[ParameterSpec, ...] = (
         low=0.0,
         high=1.0,
         scale="linear",
-        unit="exponent",
-        meaning="how far VPLs go where the camera would miss them: 0 not at all, 1 all the way",
+        unit="share",
+        meaning="share of the VPLs that go where the camera would miss them; flux alone places the rest",
         fitted=False,
     ),
     ParameterSpec(

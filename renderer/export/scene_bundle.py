@@ -25,14 +25,16 @@ from vpltune.renderer.frame.visibility_map_layout import VisibilityMapLayout
 from vpltune.renderer.gpu.camera_uniforms import camera_uniforms
 from vpltune.renderer.gpu.render_targets import MAX_ATLAS_COLUMNS
 from vpltune.renderer.scene.animation import AnimationPlayer
-from vpltune.renderer.scene.light_faces import FaceSnapping, LightRecords, light_records
+from vpltune.renderer.scene.light_faces import LightRecords, light_records
 from vpltune.renderer.scene.placed_boxes import placed_boxes
 from vpltune.renderer.scene.scene import Scene, Texture, transform_normals, transform_points
+from vpltune.renderer.scene.sun_faces import SunGrid, nested_face_count
 from vpltune.renderer.scene.views import View, light_to_json
 
 FORMAT = "vpltune-bundle"
-VERSION = 2
-"""Version of the bundle that is written. Since 2 its `config` is of version 2."""
+VERSION = 3
+"""Version of the bundle that is written. Since 2 its `config` is of version 2; since 3 a sun may have several
+faces, each within the one before, and importance mixes."""
 # What triangles without a texture look up.
 WHITE = Texture("white", np.full((1, 1, 3), 255, np.uint8))
 DOCUMENT_NAME, BINARY_NAME = "bundle.json", "bundle.bin"
@@ -56,10 +58,11 @@ def scene_bundle(scene: Scene, view: View, config: TunedConfig) -> SceneBundle:
     bounds = placed_boxes(scene).bounds(rest.transforms, rest.joint_matrices)
     binary = _Binary()
     draws = _draws(scene, binary)
-    count = len(light_records(view.lights, bounds).faces)
     resolution = rsm_resolution(view.lights, config.quality)
-    snapping = FaceSnapping(float(np.linalg.norm(bounds[1] - bounds[0])), resolution)
-    records = light_records(view.lights, bounds, snapping)
+    x, y, z = view.camera.position_world.tolist()
+    length = float(np.linalg.norm(bounds[1] - bounds[0]))
+    grid = SunGrid(resolution, (x, y, z), nested_face_count(scene), length)
+    records = light_records(view.lights, bounds, grid)
     _add_light_records(view, records, resolution, binary)
     columns, rows = _atlas(records)
     uniforms = camera_uniforms(view.camera, view.size, bounds)
@@ -86,7 +89,7 @@ def scene_bundle(scene: Scene, view: View, config: TunedConfig) -> SceneBundle:
             "faces": _faces(records, resolution),
         },
         "point_table": {"kind": "r2", "steps": list(R2_STEPS)},
-        "vpl_importance": _vpl_importance(config, count),
+        "vpl_importance": _vpl_importance(config, view),
         "clustered_discs": _clustered_discs(config),
         "visibility_maps": _visibility_maps(config),
         "draws": draws,
@@ -96,10 +99,10 @@ def scene_bundle(scene: Scene, view: View, config: TunedConfig) -> SceneBundle:
     return SceneBundle(document, bytes(binary.content))
 
 
-def _vpl_importance(config: TunedConfig, face_count: int) -> dict[str, Any]:
+def _vpl_importance(config: TunedConfig, view: View) -> dict[str, Any]:
     used = config.parameters.density_importance > 0.0
     return {
-        "cells": vpl_importance.importance_cells(face_count) if used else 0,
+        "cells": vpl_importance.importance_cells(view.lights) if used else 0,
         "receivers": vpl_importance.RECEIVERS,
         "spread": vpl_importance.SPREAD,
         "dark_share": vpl_importance.DARK_SHARE,
@@ -133,12 +136,12 @@ def _visibility_maps(config: TunedConfig) -> dict[str, int]:
     }
 
 
-def left_out(config: TunedConfig) -> tuple[str, ...]:
-    """What of a config is not drawn outside the runtime, a sentence each."""
+def left_out(config: TunedConfig, frame_size: tuple[int, int]) -> tuple[str, ...]:
+    """What of a config is not drawn outside the runtime, a sentence each; `frame_size` is in pixels."""
     sentences = []
     if config.parameters.screen_space_strength > 0.0 and not config.parameters.vpls_are_discs:
         sentences.append("The screen-space near field is drawn by the runtime alone")
-    if config.quality.interleave != 1:
+    if config.quality.interleave_for(config.parameters.vpl_count, frame_size) > 1:
         sentences.append("Every pixel gathers every VPL here; only the runtime interleaves them")
     return tuple(sentences)
 

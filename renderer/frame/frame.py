@@ -50,11 +50,11 @@ from vpltune.renderer.gpu.scene_buffers import SceneBuffers
 from vpltune.renderer.scene.light_faces import (
     FACE_DTYPE,
     LIGHT_DTYPE,
-    FaceSnapping,
     LightRecords,
     face_count,
     light_records,
 )
+from vpltune.renderer.scene.sun_faces import SunGrid
 from vpltune.renderer.scene.views import View
 
 
@@ -66,6 +66,7 @@ class FrameSetup:
     """Width and height in pixels."""
     face_count: int
     rsm_resolution: int
+    importance_cells: int
     vpl_count: int
     interleave: int
     maps: VisibilityMapLayout
@@ -73,13 +74,14 @@ class FrameSetup:
     adaptation_frames: float
 
     @classmethod
-    def of(cls, view: View, config: TunedConfig) -> "FrameSetup":
-        """The set-up that draws `view` with `config`."""
+    def of(cls, view: View, config: TunedConfig, nested_faces: int = 0) -> "FrameSetup":
+        """The set-up that draws `view` with `config`, in a scene whose suns have so many nested faces."""
         count = config.parameters.vpl_count
         return cls(
             size=view.size,
-            face_count=face_count(view.lights),
+            face_count=face_count(view.lights, nested_faces),
             rsm_resolution=rsm_resolution(view.lights, config.quality),
+            importance_cells=importance_cells(view.lights),
             vpl_count=count,
             interleave=config.quality.interleave_for(count, view.size),
             maps=VisibilityMapLayout.of(config),
@@ -103,13 +105,13 @@ class Frame:
         self.resources = scene.resources()
         self._make_targets()
         resources, rsm = self.resources, self.rsm
-        cells = importance_cells(setup.face_count)
+        cells = setup.importance_cells
         self.light_pre_pass = LightPrePass(resources, options.light_path)
         self._seen: list[FramePass] = [
             GeometryPass(resources, scene, self.gbuffer),
             self.light_pre_pass,
             ReflectiveShadowMapPass(resources, scene, rsm),
-            VplImportancePass(resources, rsm),
+            VplImportancePass(resources, rsm, cells),
             VplDensityPass(resources, rsm, cells),
             DirectLightPass(resources, rsm),
         ]
@@ -257,16 +259,23 @@ class Frame:
             self._parameters = parameters
 
 
-def frame_light_records(scene: SceneBuffers, view: View, snapped_cells: int | None = None) -> LightRecords:
+def frame_light_records(
+    scene: SceneBuffers, view: View, rsm_resolution: int, nested_faces: int, *, snapped: bool
+) -> LightRecords:
     """The view's lights as records for the scene as it stands.
 
-    With `snapped_cells` texels along its side, an orthographic face keeps its grid in the world while things
-    move; None fits the face to the scene.
+    Args:
+        scene: gives the bounds.
+        view: camera and lights.
+        rsm_resolution: texels along the side of a face.
+        nested_faces: of each directional light.
+        snapped: whether a directional light's faces keep their grid in the world while things move.
     """
-    if snapped_cells is None:
-        return light_records(view.lights, scene.bounds())
-    length = float(np.linalg.norm(scene.rest_bounds[1] - scene.rest_bounds[0]))
-    return light_records(view.lights, scene.bounds(), FaceSnapping(length, snapped_cells))
+    length = float(np.linalg.norm(scene.rest_bounds[1] - scene.rest_bounds[0])) if snapped else None
+    x, y, z = view.camera.position_world.tolist()
+    return light_records(
+        view.lights, scene.bounds(), SunGrid(rsm_resolution, (x, y, z), nested_faces, length)
+    )
 
 
 def _timed(clock: PassClock | None, name: str) -> AbstractContextManager[None]:

@@ -9,11 +9,12 @@ RSM_RESOLUTION = 1024
 RSM_RESOLUTION_OF_MANY = 512
 """The same with more than `FEW_FACES`: a point light has six."""
 FEW_FACES = 2
-"""Faces up to which each has the full resolution. A choice: two lamps, or a lamp and a sun."""
+"""Faces up to which each has the full resolution; those of a sun count as one. A choice: two lamps, or a lamp
+and a sun."""
 
 
 def rsm_resolution(lights: tuple[Light, ...], quality: Quality | None = None) -> int:
     """Texels along the side of each face of these lights: what `quality` says, else by their number."""
     if quality is not None and quality.rsm_resolution is not None:
         return quality.rsm_resolution
-    return RSM_RESOLUTION if face_count(lights) <= FEW_FACES else RSM_RESOLUTION_OF_MANY
+    return RSM_RESOLUTION if face_count(lights, nested_faces=0) <= FEW_FACES else RSM_RESOLUTION_OF_MANY

@@ -24,6 +24,7 @@ from vpltune.renderer.gpu.scene_buffers import SceneBuffers
 from vpltune.renderer.scene.animation import Pose
 from vpltune.renderer.scene.dynamic_lights import DynamicLights
 from vpltune.renderer.scene.scene import Scene
+from vpltune.renderer.scene.sun_faces import nested_face_count
 from vpltune.renderer.scene.views import View
 
 Layer = Literal["final", "direct", "indirect", "irradiance", "albedo", "normal", "depth"]
@@ -122,6 +123,7 @@ class Runtime:
         self.scene_buffers = SceneBuffers(self._context, scene)
         self._hierarchy: RayHierarchy | None = None
         self._scene = scene
+        self._nested_faces = nested_face_count(scene)
         self._frames: OrderedDict[FrameSetup, Frame] = OrderedDict()
 
     @property
@@ -272,7 +274,15 @@ class Runtime:
         Raises:
             ValueError: there are no configs, they draw VPLs differently, or one has a prior.
         """
-        if len({(placement(each.parameters), FrameSetup.of(view, each)) for each in configs}) != 1:
+        if (
+            len(
+                {
+                    (placement(each.parameters), FrameSetup.of(view, each, self._nested_faces))
+                    for each in configs
+                }
+            )
+            != 1
+        ):
             raise ValueError("capture_variants: configs must be one or more with one placement of the VPLs")
         if any(each.auto is not None for each in configs):
             raise ValueError("capture_variants: configs must have no prior")
@@ -308,7 +318,7 @@ class Runtime:
 
     def _tone_mapped(self, radiance: np.ndarray, exposure: float | None) -> Frame:
         height, width = radiance.shape[:2]
-        frame = self._frame(FrameSetup((width, height), 1, 1, 1, 1, NO_MAPS, None, 0.0))
+        frame = self._frame(FrameSetup((width, height), 1, 1, 1, 1, 1, NO_MAPS, None, 0.0))
         pixels = np.ones((height, width, 4), np.float32)
         pixels[..., : radiance.shape[2]] = radiance
         frame.texture("radiance").write(np.ascontiguousarray(pixels[::-1]).tobytes())
@@ -324,7 +334,7 @@ class Runtime:
         table_rotation: tuple[float, float] = (0.0, 0.0),
         lights: DynamicLights | None = None,
     ) -> DrawnFrame:
-        frame = self._frame(FrameSetup.of(view, config))
+        frame = self._frame(FrameSetup.of(view, config, self._nested_faces))
         inputs = self._inputs(view, config, state, table_rotation=table_rotation, lights=lights)
         frame.draw(inputs)
         return DrawnFrame(frame, inputs, view, config)
@@ -338,12 +348,17 @@ class Runtime:
         table_rotation: tuple[float, float] = (0.0, 0.0),
         lights: DynamicLights | None = None,
     ) -> FrameInputs:
-        frame = self._frame(FrameSetup.of(view, config))
-        snapped = frame.setup.rsm_resolution if self.options.rsm_snapping else None
+        frame = self._frame(FrameSetup.of(view, config, self._nested_faces))
         low, high = self.scene_buffers.bounds()
         return FrameInputs(
             camera=frame.camera(view),
-            records=frame_light_records(self.scene_buffers, view, snapped),
+            records=frame_light_records(
+                self.scene_buffers,
+                view,
+                frame.setup.rsm_resolution,
+                self._nested_faces,
+                snapped=self.options.rsm_snapping,
+            ),
             parameters=config.parameters,
             scene_diagonal=float(np.linalg.norm(high - low)),
             table_rotation=table_rotation,

@@ -7,10 +7,9 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 TEXEL_BYTES = 8
 """A distance and a packed normal, or the place of finer texels: shaders/common/vpl_visibility.glsl."""
 VISIBILITY_LIFT = 0.01
-"""Rays start, and distances count, from a point lifted off the VPL's surface by this many footprints."""
-VISIBILITY_LEAST_LIFT = 1e-3
-"""And by this share of L at least. Interpolated RSM depth is off by about 1e-4 L, and a VPL behind its own
-surface would see nothing else."""
+"""Rays start, and distances count, from a point lifted off the VPL's surface by this many footprints. A VPL
+behind its own surface would see nothing else, and the RSM is off: by 1/256 of a texel, in which a rasteriser
+counts places, and by the rounding of its depth. A footprint is tens of texels."""
 FRAME_TURNS_OVER = -0.5
 """The z of a normal below which a map's tangents turn over. Not 0, where walls have their normals and
 rounding would decide."""
@@ -46,7 +45,6 @@ class VisibilityMapLayout:
             "VISIBILITY_MAP_SIZE": self.size,
             "VISIBILITY_MAP_REFINEMENT": self.refinement,
             "VISIBILITY_LIFT": VISIBILITY_LIFT,
-            "VISIBILITY_LEAST_LIFT": VISIBILITY_LEAST_LIFT,
             "FRAME_TURNS_OVER": FRAME_TURNS_OVER,
         }
 

@@ -1,4 +1,4 @@
-"""The RSM faces of lights: one for a narrow spot or the sun, five for a wide spot, six for a point light."""
+"""The RSM faces of lights: one for a narrow spot, five for a wide one, six for a point light, a sun's own."""
 
 import math
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from vpltune.renderer.scene.scene import Light
+from vpltune.renderer.scene.sun_faces import SunGrid, sun_faces
 
 KIND_CODES = {"spot": 0, "point": 1, "directional": 2}
 """Light kinds as numbers in `position_kind.w`; shaders/common/lights.glsl reads them."""
@@ -59,20 +60,6 @@ _CUBE = np.array(
 """Rotations of the six cube faces, whose −Z axes are +X, −X, +Y, −Y, −Z and +Z in turn."""
 
 
-SIZE_STEP = 2.0**0.125
-"""A choice: ratio of consecutive sizes of a snapped face. It costs at most 1/12 of the texels per axis."""
-
-
-@dataclass(frozen=True)
-class FaceSnapping:
-    """Snapping of an orthographic face to a world-space grid, so texels do not crawl while bounds change."""
-
-    length: float
-    """A length of the scene at rest, world units. Sizes are steps from it, so they scale with the scene."""
-    cells: int
-    """Grid cells along the side of a face. The face moves by whole cells."""
-
-
 @dataclass(frozen=True)
 class LightRecords:
     """Lights and faces in the layout that shaders/common/lights.glsl reads."""
@@ -85,25 +72,30 @@ class LightRecords:
     """Origin of the first face, world units. Sums of squared distances from it lose little precision."""
 
 
-def face_count(lights: tuple[Light, ...]) -> int:
-    """Number of RSM faces of the lights. It depends on their kinds and cones only."""
-    return sum(_face_count(light) for light in lights)
+def face_count(lights: tuple[Light, ...], nested_faces: int) -> int:
+    """Number of RSM faces of the lights. It depends on their kinds and cones only.
+
+    Args:
+        lights: the lights of a view.
+        nested_faces: `sun_faces.nested_face_count` of the scene; 0 counts a sun as one face.
+    """
+    return sum(_face_count(light, nested_faces) for light in lights)
 
 
 def light_records(
-    lights: tuple[Light, ...], bounds: Float64[np.ndarray, "2 3"], snapping: FaceSnapping | None = None
+    lights: tuple[Light, ...], bounds: Float64[np.ndarray, "2 3"], grid: SunGrid
 ) -> LightRecords:
     """Records of the lights and their RSM faces, for a scene within `bounds`.
 
     Args:
         lights: the lights of a view.
         bounds: low and high corner of the scene, world units.
-        snapping: snaps orthographic faces to a grid; None fits them tightly to `bounds`.
+        grid: what the faces of directional lights are laid out by.
     """
     records = np.zeros(len(lights), LIGHT_DTYPE)
     faces: list[np.ndarray] = []
     for index, light in enumerate(lights):
-        own = _faces(light, index, bounds, snapping)
+        own = _faces(light, index, bounds, grid)
         cos_inner, cos_outer = math.cos(light.inner_cone), math.cos(light.outer_cone)
         records[index] = (
             (*light.position_world, KIND_CODES[light.kind]),
@@ -118,18 +110,31 @@ def light_records(
     return LightRecords(records, all_faces, (x, y, z))
 
 
-def _face_count(light: Light) -> int:
+def _face_count(light: Light, nested_faces: int) -> int:
     if light.kind == "point":
         return 6
+    if light.kind == "directional":
+        return 1 + nested_faces
     # A spot does not light what is behind it, so its sixth cube face would stay dark.
     return 5 if light.kind == "spot" and light.outer_cone > WIDEST_SINGLE_FACE else 1
 
 
-def _faces(light: Light, index: int, bounds: np.ndarray, snapping: FaceSnapping | None) -> list[np.ndarray]:
+def _faces(light: Light, index: int, bounds: np.ndarray, grid: SunGrid) -> list[np.ndarray]:
     if light.kind == "directional":
-        return [_sun_face(light, index, bounds, snapping)]
+        rotation = _rotation_along(light.direction_world)
+        return [
+            _face(
+                rotation,
+                rotation @ np.array([*face.center, face.front]),
+                index,
+                1,
+                (face.extent[0], face.extent[1]),
+                face.depth,
+            )
+            for face in sun_faces(rotation, bounds, grid)
+        ]
     near = NEAR_PLANE * float(np.linalg.norm(bounds[1] - bounds[0])) / 2.0
-    count = _face_count(light)
+    count = _face_count(light, grid.nested_faces)
     if count == 1:
         tan_outer = math.tan(light.outer_cone)
         rotation = _rotation_along(light.direction_world)
@@ -138,33 +143,6 @@ def _faces(light: Light, index: int, bounds: np.ndarray, snapping: FaceSnapping 
     if light.kind == "spot":
         rotations = _rotation_along(light.direction_world) @ _CUBE[:count]
     return [_face(rotation, light.position_world, index, 0, (1.0, 1.0), near) for rotation in rotations]
-
-
-def _sun_face(light: Light, index: int, bounds: np.ndarray, snapping: FaceSnapping | None) -> np.ndarray:
-    """An orthographic face along the light that contains all of `bounds`."""
-    rotation = _rotation_along(light.direction_world)
-    selector = np.array([[(corner >> axis) & 1 for axis in range(3)] for corner in range(8)])
-    corners = bounds[selector, np.arange(3)] @ rotation
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    # A margin of 1 % of the diagonal: a flat scene has no depth of its own, and surfaces on the bounds must
-    # not fall on the border of the tile.
-    room = 0.01 * float(np.linalg.norm(high - low))
-    extent = (high - low) / 2.0 + room
-    front = (low + high) / 2.0
-    front[2] = high[2] + room
-    if snapping is not None:
-        extent[:2], front[:2] = _snapped(extent[:2], front[:2], snapping)
-    return _face(rotation, rotation @ front, index, 1, (extent[0], extent[1]), 2.0 * extent[2])
-
-
-def _snapped(extent: np.ndarray, center: np.ndarray, snapping: FaceSnapping) -> tuple[np.ndarray, np.ndarray]:
-    """The extent rounded up to a size step, and the centre rounded to the grid of that size."""
-    # Rounding moves the centre by up to half a cell, which is 1/cells of the extent.
-    needed = extent * (1.0 + 1.0 / (snapping.cells - 1.0))
-    steps = np.ceil(np.log(needed / snapping.length) / math.log(SIZE_STEP))
-    extent = snapping.length * SIZE_STEP**steps
-    cell = 2.0 * extent / snapping.cells
-    return extent, np.round(center / cell) * cell
 
 
 def _face(

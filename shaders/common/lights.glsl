@@ -1,6 +1,6 @@
 // Punctual lights (spot, point, directional) and the faces of their reflective shadow maps (RSM).
 //
-// Provides: PI, `lights`, `rsm_faces`, and the light that arrives at a point without shadow.
+// Provides: PI, `lights`, `rsm_faces`, the light that arrives at a point without shadow, and `shown_finer`.
 // Constants: LIGHT_COUNT and RSM_FACE_COUNT, in the web page only (renderer/export/web_page/web_page.py).
 // Python: renderer/scene/light_faces.py, which also owns the byte layout of both structs.
 
@@ -81,4 +81,15 @@ vec3 irradiance_facing(Light light, vec3 position_world) {
 // A world position in the face's own space.
 vec3 world_to_face(RsmFace face, vec3 position_world) {
     return transpose(mat3(face.light_to_world)) * (position_world - face.light_to_world[3].xyz);
+}
+
+// Whether a finer face of the same light shows a position. The faces of a directional light are nested, each in the one
+// before it (renderer/scene/sun_faces.py); the finest that shows a surface carries its flux, the others none.
+bool shown_finer(int face_index, vec3 position_world) {
+    ivec4 faces = lights[rsm_faces[face_index].light].faces;
+    if (rsm_faces[face_index].orthographic == 0 || face_index + 1 >= faces.x + faces.y) {
+        return false;
+    }
+    RsmFace finer = rsm_faces[face_index + 1];
+    return all(lessThan(abs(world_to_face(finer, position_world).xy), finer.extent));
 }

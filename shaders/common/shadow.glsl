@@ -7,12 +7,22 @@
 const float NORMAL_BIAS = 1.5;
 const float DEPTH_BIAS = 0.5;
 
-// The light's face that looks towards a position most directly.
+// A choice: a face is used up to this many texels from its border. A receiver moves by up to 1.5, and the filter looks
+// one further.
+const float BORDER = 3.0;
+
+// The light's face that looks towards a position most directly; of nested ones, the finest that shows it.
 int face_towards(Light light, vec3 position_world) {
     int best = light.faces.x;
     float best_depth = -1.0;
     for (int i = light.faces.x; i < light.faces.x + light.faces.y; ++i) {
-        float depth = -normalize(world_to_face(rsm_faces[i], position_world)).z;
+        vec3 position_face = world_to_face(rsm_faces[i], position_world);
+        if (rsm_faces[i].orthographic != 0) {
+            vec2 reach = rsm_faces[i].extent * (1.0 - 2.0 * BORDER / float(RSM_RESOLUTION));
+            if (all(lessThan(abs(position_face.xy), reach))) { best = i; }
+            continue;
+        }
+        float depth = -normalize(position_face).z;
         if (depth > best_depth) { best_depth = depth; best = i; }
     }
     return best;

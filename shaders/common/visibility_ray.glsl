@@ -23,7 +23,7 @@ uvec2 cast_visibility_texel(VirtualPointLight vpl, vec3 axis) {
     vec3 direction = frame * axis;
     RayHit hit = RayHit(longest, RAY_NO_TRIANGLE, 0u);
     if (any(greaterThan(vpl.flux.rgb, vec3(0.0)))) {
-        hit = ray_hit(visibility_origin(vpl, scene_length), direction, longest);
+        hit = ray_hit(visibility_origin(vpl), direction, longest);
     }
     if (hit.triangle == RAY_NO_TRIANGLE) {
         return visibility_nothing(axis);

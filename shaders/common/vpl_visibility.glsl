@@ -1,8 +1,8 @@
 // Visibility of a VPL from its visibility map: a small hemispherical map of the surfaces that the VPL sees.
 //
 // Provides: reading and writing of a map's entries, and `vpl_visibility`. Needs common/virtual_point_lights.glsl.
-// Constants: VISIBILITY_MAP_SIZE, VISIBILITY_MAP_REFINEMENT, VISIBILITY_LIFT [footprints] and VISIBILITY_LEAST_LIFT [L]
-// of renderer/frame/visibility_map_layout.py.
+// Constants: VISIBILITY_MAP_SIZE, VISIBILITY_MAP_REFINEMENT and VISIBILITY_LIFT [footprints] of
+// renderer/frame/visibility_map_layout.py.
 // Twin: tuner/surrogate/vpl_visibility.py. Imperfect shadow maps (Ritschel et al. 2008) hold the same, but as depths.
 #include "common/hemi_octahedral.glsl"
 #include "common/octahedral.glsl"
@@ -43,9 +43,8 @@ struct VisibilityParameters {
 };
 
 // The map's origin, lifted off the VPL's surface: rays start there, and distances are measured from there.
-vec3 visibility_origin(VirtualPointLight vpl, float scene_length) {
-    float lift = max(VISIBILITY_LIFT * vpl.position_footprint.w, VISIBILITY_LEAST_LIFT * scene_length);
-    return vpl.position_footprint.xyz + vpl.normal_area.xyz * lift;
+vec3 visibility_origin(VirtualPointLight vpl) {
+    return vpl.position_footprint.xyz + vpl.normal_area.xyz * (VISIBILITY_LIFT * vpl.position_footprint.w);
 }
 
 // The unit direction of a texel's ray, in the VPL's frame.
@@ -105,7 +104,7 @@ float vpl_visibility(
 ) {
     // Computed for each pair: cheaper than nine more numbers in shared memory.
     mat3 frame = hemisphere_frame(vpl.normal_area.xyz);
-    vec3 to_receiver = (position_world - visibility_origin(vpl, scene_length)) * frame / scene_length;
+    vec3 to_receiver = (position_world - visibility_origin(vpl)) * frame / scene_length;
     vec3 normal = normal_world * frame;
     // A receiver below the VPL's horizon, or facing away from it, gets no light anyway.
     if (!(to_receiver.z > 0.0) || !(dot(to_receiver, normal) < 0.0)) {

@@ -73,7 +73,7 @@ uvec2 cast_visibility_texel(VirtualPointLight vpl, vec3 axis) {
     float nearest = longest;
     uint met = RAY_DONE;
     if (any(greaterThan(vpl.flux.rgb, vec3(0.0)))) {
-        met = nearest_triangle(space_ray(visibility_origin(vpl, scene_length), direction), nearest);
+        met = nearest_triangle(space_ray(visibility_origin(vpl), direction), nearest);
     }
     if (met == RAY_DONE) {
         return visibility_texel(VISIBILITY_NOTHING * longest / scene_length, -axis);

@@ -1,7 +1,9 @@
-// Web page, VPL importance, part 4: the mean importance over the lit cells. One fragment.
+// Web page, VPL importance, part 4: the flux-weighted mean importance over the cells. One fragment.
 //
-// Reads: importance. Writes: its mean. Runtime: vpl_importance/vpl_importance_factor.comp, which also applies it.
+// Reads: importance, importance cells. Writes: its mean. Runtime: vpl_importance/vpl_importance_factor.comp, which also
+// applies it.
 uniform sampler2D importance;
+uniform sampler2D cell_position_flux;
 
 layout(location = 0) out float out_mean;
 
@@ -11,10 +13,10 @@ void main() {
     for (int y = 0; y < cells.y; ++y) {
         vec2 sum_of_row = vec2(0.0);
         for (int x = 0; x < cells.x; ++x) {
-            float one = texelFetch(importance, ivec2(x, y), 0).r;
-            sum_of_row += one > 0.0 ? vec2(one, 1.0) : vec2(0.0);
+            float flux = texelFetch(cell_position_flux, ivec2(x, y), 0).w;
+            sum_of_row += flux * vec2(texelFetch(importance, ivec2(x, y), 0).r, 1.0);
         }
         sum += sum_of_row;
     }
-    out_mean = sum.x / max(sum.y, 1.0);
+    out_mean = sum.x / max(sum.y, 1e-30);
 }

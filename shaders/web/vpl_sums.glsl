@@ -1,17 +1,15 @@
 // Web page: what common/vpl_placement.glsl needs, read from textures.
 //
 // Provides: `sum_in_row`, `sum_of_rows`, `sampling_weight`, `total_weight`, `vpl_count`, `rows`.
-// Constants: IMPORTANCE_CELLS, 0 without importance; LEAST_IMPORTANCE of renderer/frame/passes/vpl_importance.py.
+// Constants: IMPORTANCE_CELLS, LEAST_IMPORTANCE of renderer/frame/passes/vpl_importance.py.
 uniform sampler2D sums_in_rows;   // running sums of the sampling weights along the rows of the RSM atlas
 uniform sampler2D sums_of_rows;   // one column: running sums of the rows' totals
 uniform int vpl_count;
 uniform int rows;
 uniform float density_exponent;
-#if IMPORTANCE_CELLS > 0
 uniform float density_importance;
 uniform sampler2D importance;       // one texel for each importance cell
 uniform sampler2D mean_importance;  // one texel
-#endif
 
 float sum_in_row(int row, int column) {
     return texelFetch(sums_in_rows, ivec2(column, row), 0).r;
@@ -24,13 +22,12 @@ float sum_of_rows(int row) {
 // flux^γ times the importance factor. Runtime: common/vpl_importance.glsl and vpl_importance_factor.comp.
 float sampling_weight(ivec2 texel, float flux) {
     float weight = pow(flux, density_exponent);
-#if IMPORTANCE_CELLS > 0
     if (density_importance > 0.0) {
         float mean = texelFetch(mean_importance, ivec2(0), 0).r;
         float own = texelFetch(importance, texel * IMPORTANCE_CELLS / RSM_RESOLUTION, 0).r;
-        weight *= pow((mean > 0.0 ? own / mean : 1.0) + LEAST_IMPORTANCE, density_importance);
+        float least = max(1.0 - density_importance, LEAST_IMPORTANCE);
+        weight *= density_importance * (mean > 0.0 ? own / mean : 1.0) + least;
     }
-#endif
     return weight;
 }
 

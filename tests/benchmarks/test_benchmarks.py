@@ -55,18 +55,37 @@ def test_bench_prints_the_rows(capfd, monkeypatch, names):
     assert "boil_s" in capfd.readouterr().out
 
 
-def test_passes_are_rows_that_add_up(monkeypatch):
-    """Each pass of a frame is a row; their ratios to the whole sum to 1, to float rounding."""
-    import benchmarks.speed.runtime_passes as passes
+def test_an_interrupted_benchmark_prints_the_rows_that_it_has(capfd, monkeypatch):
+    """Exit code 130 and one row; without any row, as for every command."""
+    row = Row("boil_s", 2.0, "s", "limit", 4.0)
 
-    monkeypatch.setattr(passes, "SIZE", (64, 48))
-    monkeypatch.setattr(passes, "LIGHT_COUNT", 20)
-    rows = passes.pass_rows(lambda stage, share: None)
-    names = [row.name for row in rows]
-    assert names[0] == "pass_geometry"
-    assert names[-1] == "pass_tone_mapping"
-    assert {"pass_reflective_shadow_map", "pass_vpl_gather", "pass_light_pre_pass"} < set(names)
-    assert sum(row.ratio for row in rows) == pytest.approx(1.0)
+    def run_benchmark(name, progress):
+        if name == "boil":
+            yield row
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(benchmarks, "benchmark_names", lambda: ("boil", "cool"))
+    monkeypatch.setattr(benchmarks, "run_benchmark", run_benchmark)
+    monkeypatch.setattr(benchmarks.harness.machine, "machine_description", lambda: "a machine")
+    assert run(["bench", "boil", "--json"]) == 130
+    shown = capfd.readouterr()
+    assert json.loads(shown.out)["rows"] == [row.as_dict()]
+    assert "interrupted after 1 row" in shown.err
+    assert run(["bench", "cool"]) == 130
+    assert capfd.readouterr().err == "vpltune: interrupted\n"
+
+
+def test_a_row_that_was_left_out_has_dashes(capfd, monkeypatch):
+    """And null in JSON, which has no number that is none."""
+    row = Row("boil_s", math.nan, "s", "left out", 4.0)
+    monkeypatch.setattr(benchmarks, "benchmark_names", lambda: ("boil",))
+    monkeypatch.setattr(benchmarks, "run_benchmark", lambda name, progress: iter([row]))
+    monkeypatch.setattr(benchmarks.harness.machine, "machine_description", lambda: "a machine")
+    assert run(["bench", "boil", "--json"]) == 0
+    assert json.loads(capfd.readouterr().out)["rows"][0]["value"] is None
+    assert run(["bench", "boil"]) == 0
+    shown = capfd.readouterr().out
+    assert "–" in shown and "nan" not in shown
 
 
 def test_steadier_than_without(monkeypatch):

@@ -36,7 +36,7 @@ def test_rows_are_of_one_mode_and_of_lit_scenes():
     assert rows["default.median_trimmed_relmse"].value == pytest.approx(1.0)
     assert rows["default.share_within_2_percent"].value == pytest.approx(2 / 3)
     assert rows["default.kept_share"].value == pytest.approx(1 / 3)
-    assert "| dark | 1,024 | unlit | – |" in table(results)
+    assert "| dark | 512 | unlit | – |" in table(results)
 
 
 def test_every_scene_is_fitted_in_both_modes_and_the_seed_is_not_that_of_the_prior():

@@ -74,6 +74,7 @@ BROUGHT_FORWARD = TunedConfig(
     ),
     {"scene": "box"},
     "transmittance",
+    quality=Quality(interleave=1),
     fit=FitNote("kept", "no gain"),
 )
 
@@ -206,6 +207,13 @@ def test_several_flags_are_a_line_each(rendered, config_path, runtime, view, cap
     assert [line.split()[1] for line in lines] == [flag(name) for name, _, _ in OVERRIDES]
 
 
+def test_interleaving_takes_a_word_or_a_number():
+    changed, notes = with_flags(CONFIG, interleave="auto")
+    assert changed.quality == replace(QUALITY, interleave="auto")
+    assert notes == ("--interleave auto overrides the config, which has 4",)
+    assert with_flags(CONFIG, interleave="2")[0].quality == replace(QUALITY, interleave=2)
+
+
 def test_a_flag_that_changes_nothing_says_nothing(rendered, config_path, runtime, view, capfd):
     drawn = rendered(config_path, *(f"{flag(name)}={own}" for name, _, own in OVERRIDES))
     np.testing.assert_array_equal(drawn, runtime.render(view, CONFIG, layer="irradiance"))
@@ -230,8 +238,9 @@ def test_a_budget_is_forgotten_with_what_it_was_met_with():
 @pytest.mark.parametrize(
     ("name", "value", "rule"),
     [
-        ("interleave", "3", "must be one of 1, 2, 4, 8, got 3"),
-        ("interleave", "0", "must be one of 1, 2, 4, 8, got 0"),
+        ("interleave", "3", "must be one of auto, 1, 2, 4, 8, got 3"),
+        ("interleave", "0", "must be one of auto, 1, 2, 4, 8, got 0"),
+        ("interleave", "full", "must be one of auto, 1, 2, 4, 8, got 'full'"),
         ("map_size", "3", "must be a whole number from 4 to 64, got 3"),
         ("map_size", "65", "must be a whole number from 4 to 64, got 65"),
         ("map_refinement", "16", "must be one of 1, 2, 4, 8, got 16"),

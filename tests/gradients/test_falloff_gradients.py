@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
 from corner import corner
+from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
@@ -20,9 +21,9 @@ from vpltune.tuner.surrogate.virtual_point_lights import gather_inputs
 from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, gather, gather_pairwise
 
 CELLS = ArtistParameters(vpl_count=64, lloyd_iterations=4, falloff_footprint=0.9, extinction_coefficient=0.6)
-START = ArtistParameters(intensity=1.4, falloff_footprint=0.7, extinction_coefficient=0.6, vpl_count=256)
+START = point_vpls(intensity=1.4, falloff_footprint=0.7, extinction_coefficient=0.6, vpl_count=256)
 STEP = {"intensity": 0.05, "falloff_footprint": 0.05, "extinction_coefficient": 0.05}
-WITHOUT_MAPS = TunedConfig(visibility="transmittance")
+WITHOUT_MAPS = TunedConfig(point_vpls(), visibility="transmittance")
 
 
 @pytest.mark.parametrize("start", [START, CELLS], ids=["points", "cells"])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
 from corner import corner
+from point_vpls import point_vpls
 from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
@@ -25,14 +26,14 @@ from vpltune.tuner.surrogate.vpl_gather import (
     gather_pairwise,
 )
 
-PARAMETERS = (
-    ArtistParameters(),
-    ArtistParameters(intensity=0.7, falloff_footprint=2.0, extinction_coefficient=0.8),
-    ArtistParameters(intensity=3.0, falloff_footprint=0.1, extinction_coefficient=0.0),
+POINTS = (
+    point_vpls(),
+    point_vpls(intensity=0.7, falloff_footprint=2.0, extinction_coefficient=0.8),
+    point_vpls(intensity=3.0, falloff_footprint=0.1, extinction_coefficient=0.0),
 )
 
 # Visibility maps have their own twins in test_visibility_twins.py.
-WITHOUT_MAPS = TunedConfig(visibility="transmittance")
+WITHOUT_MAPS = TunedConfig(point_vpls(), visibility="transmittance")
 
 
 def relative_rms(value: np.ndarray, expected: np.ndarray) -> float:
@@ -40,7 +41,8 @@ def relative_rms(value: np.ndarray, expected: np.ndarray) -> float:
     return float(np.sqrt(np.mean((value - expected) ** 2) / np.mean(expected**2)))
 
 
-CELLS = (
+DISCS = (
+    ArtistParameters(),
     ArtistParameters(vpl_count=32, lloyd_iterations=4, falloff_footprint=1.0),
     ArtistParameters(
         vpl_count=200,
@@ -64,7 +66,7 @@ def twin_error(runtime: Runtime, view: View, parameters: ArtistParameters) -> fl
     return relative_rms(image, drawn)
 
 
-@pytest.mark.parametrize("parameters", (*PARAMETERS, *CELLS))
+@pytest.mark.parametrize("parameters", (*POINTS, *DISCS))
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_twins_agree_in_the_room(gl_context, light, parameters):
     """The relative RMSE is below 1e-4: both twins use float32, in different coordinates."""
@@ -77,7 +79,7 @@ def scene_twin_error(path, gl_context) -> float:
     camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
     view = View(path.stem, "fitted", (96, 72), camera, lights)
     runtime = Runtime(scene, context=gl_context)
-    return max(twin_error(runtime, view, parameters) for parameters in (*PARAMETERS, CELLS[0]))
+    return max(twin_error(runtime, view, parameters) for parameters in (*POINTS[1:], *DISCS[:2]))
 
 
 @pytest.mark.parametrize("path", OWN_SCENES, ids=lambda path: path.stem)
@@ -92,13 +94,13 @@ def test_twins_agree_on_scenes_of_others(gl_context, scenes_folder, name):
     assert scene_twin_error(outside_scene(scenes_folder, name), gl_context) < 1e-3
 
 
-@pytest.mark.parametrize("config", [WITHOUT_MAPS, WITHOUT_MAPS.with_parameters(CELLS[0])])
+@pytest.mark.parametrize("config", [WITHOUT_MAPS, WITHOUT_MAPS.with_parameters(DISCS[1])])
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_factored_gather_equals_its_definition(gl_context, light, config):
     """Axis by axis and pair by pair agree to a relative RMSE of 1e-4: float32 in another order."""
     captured = Runtime(colored_room(), context=gl_context).capture(room_view(light, (32, 24)), config)
     receivers, vpls = gather_inputs(captured)
-    for parameters in map(FalloffParameters.of, PARAMETERS):
+    for parameters in map(FalloffParameters.of, POINTS):
         pairwise = np.asarray(gather_pairwise(receivers, vpls, parameters))
         assert relative_rms(np.asarray(gather(receivers, vpls, parameters)), pairwise) < 1e-4
 
@@ -119,7 +121,7 @@ def test_tabulated_gather_is_close(gl_context, light):
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_tabulated_gather_of_discs_is_close(gl_context, light):
     """The error is below 4 % for 32 discs, whose edges cross receivers between nodes of α; 0.3 % at α = 1."""
-    config = WITHOUT_MAPS.with_parameters(CELLS[0])
+    config = WITHOUT_MAPS.with_parameters(DISCS[1])
     captured = Runtime(colored_room(), context=gl_context).capture(room_view(light), config)
     receivers, vpls = gather_inputs(captured)
     assert vpls.cells

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
+from point_vpls import point_vpls
 from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
@@ -27,6 +28,7 @@ from vpltune.tuner.surrogate.vpl_visibility import (
 )
 
 PARAMETERS = ArtistParameters(vpl_count=256)
+FORMS = {"points": point_vpls(vpl_count=256), "discs": PARAMETERS}
 MAPS = TunedConfig(PARAMETERS, visibility="maps")
 
 
@@ -41,15 +43,16 @@ def surrogate(captured: CapturedFrame, parameters: ArtistParameters) -> np.ndarr
     return np.asarray(jax.jit(gather)(receivers, vpls, FalloffParameters.of(parameters), visibility))
 
 
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("bias", "softness"), [(0.0001, 0.0005), (0.0005, 0.001), (0.1, 0.5)])
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
-def test_twins_agree_in_the_room(gl_context, light, bias, softness):
+def test_twins_agree_in_the_room(gl_context, light, bias, softness, form):
     """The relative RMSE is below 1e-3 over all pixels, including those at shadow edges.
 
     For some ten of 10⁶ pairs, rounding decides between two adjacent texels; each has a 256th of a pixel's
     light.
     """
-    parameters = ArtistParameters(vpl_count=256, visibility_bias=bias, visibility_softness=softness)
+    parameters = replace(FORMS[form], visibility_bias=bias, visibility_softness=softness)
     runtime = Runtime(colored_room(), context=gl_context)
     captured = runtime.capture(room_view(light), MAPS.with_parameters(parameters))
     drawn = captured.vpl_irradiance[captured.valid]

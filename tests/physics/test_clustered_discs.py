@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
 from converged_views import corner_view
+from point_vpls import point_vpls
 
-from vpltune.renderer.config.artist_parameters import LARGEST_DISC_COUNT, ArtistParameters
+from vpltune.renderer.config.artist_parameters import LARGEST_DISC_COUNT
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -18,10 +19,10 @@ from vpltune.tuner.fitting.fit_density import DISC_FOOTPRINT
 
 
 def config_with(**parameters) -> TunedConfig:
-    """32 discs, or with `lloyd_iterations` 0 points."""
-    iterations = parameters.get("lloyd_iterations", 4)
-    form = {"lloyd_iterations": iterations, "falloff_footprint": DISC_FOOTPRINT if iterations else 0.5}
-    chosen = ArtistParameters(**{"vpl_count": 32, **form, **parameters})
+    """32 discs placed by flux alone, or with `lloyd_iterations` 0 points."""
+    discs = {"vpl_count": 32, "lloyd_iterations": 4, "falloff_footprint": DISC_FOOTPRINT}
+    form = discs if parameters.get("lloyd_iterations", 4) else {"vpl_count": 32}
+    chosen = point_vpls(**{**form, **parameters})
     return TunedConfig(chosen, visibility="transmittance", quality=Quality(rsm_resolution=256))
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
+from point_vpls import point_vpls
 from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
@@ -29,6 +30,7 @@ from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.light_faces import light_records
 from vpltune.renderer.scene.placement import resolve_camera_and_lights
 from vpltune.renderer.scene.scene import Camera, Light, look_at
+from vpltune.renderer.scene.sun_faces import SunGrid
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.metrics.view_metrics import energy_ratio, relmse
 
@@ -37,7 +39,8 @@ UNLIT = {"bevy-irradiancevolumeexample"}
 
 
 def captured(gl_context, scene, view, interleave, **parameters) -> CapturedFrame:
-    config = TunedConfig(ArtistParameters(**parameters), quality=Quality(interleave=interleave))
+    """What the runtime draws, by default with points."""
+    config = TunedConfig(point_vpls(**parameters), quality=Quality(interleave=interleave))
     return Runtime(scene, context=gl_context).capture(view, config)
 
 
@@ -132,7 +135,9 @@ def drawn_gbuffer(gl_context, image, depth_and_normal, light=None) -> Resources:
 def inputs_of(resources: Resources) -> FrameInputs:
     bounds = np.array([[-1.0, -1, -1], [1, 1, 1]])
     camera = camera_uniforms(Camera(np.eye(4), 0.8), resources.texture("shared_irradiance").size, bounds)
-    return FrameInputs(camera, light_records((), bounds), ArtistParameters(), 1.0)
+    return FrameInputs(
+        camera, light_records((), bounds, SunGrid(1, (0.0, 0.0, 0.0))), ArtistParameters(), 1.0
+    )
 
 
 def listed(resources: Resources) -> int:

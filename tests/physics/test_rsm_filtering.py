@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
+from point_vpls import point_vpls
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -20,7 +20,7 @@ def runtime_with(scene, gl_context, filtering) -> Runtime:
 
 
 def config_with(**parameters) -> TunedConfig:
-    return TunedConfig(ArtistParameters(**parameters), quality=Quality(rsm_resolution=256))
+    return TunedConfig(point_vpls(**parameters), quality=Quality(rsm_resolution=256))
 
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)

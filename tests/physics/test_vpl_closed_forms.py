@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from built_scenes import quad, scene_of
+from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
@@ -12,8 +13,9 @@ from vpltune.renderer.scene.scene import Camera, Light, look_at
 from vpltune.renderer.scene.views import View
 
 
-def captured_view(scene, gl_context, view, **parameters) -> CapturedFrame:
-    config = TunedConfig(ArtistParameters(**parameters))
+def captured_view(scene, gl_context, view, parameters=None) -> CapturedFrame:
+    """What the runtime draws with these parameters, by default as points."""
+    config = TunedConfig(point_vpls() if parameters is None else parameters)
     return Runtime(scene, context=gl_context).capture(view, config)
 
 
@@ -36,7 +38,7 @@ def test_one_vpl_is_a_coaxial_disc(gl_context):
     camera = Camera(look_at(np.array([0.0, 1.5, 0.001]), np.zeros(3)), 0.02)
     scene = scene_of([ceiling, floor], [(0.5, 0.5, 0.5)])
     view = View("disc", "fitted", (8, 8), camera, (light,))
-    captured = captured_view(scene, gl_context, view, vpl_count=1, falloff_footprint=1.0)
+    captured = captured_view(scene, gl_context, view, point_vpls(vpl_count=1, falloff_footprint=1.0))
     to_vpl = captured.vpl_position_world[0] - captured.position_world
     distance_squared = (to_vpl**2).sum(axis=-1)
     # Floor and disc are parallel: both cosines are h/d.
@@ -102,7 +104,7 @@ def test_floor_beside_an_evenly_lit_wall(gl_context, distance):
     camera = Camera(look_at(target + np.array([0.0, 0.8, 0.0]), target), 0.01)
     scene = scene_of([wall, floor], [(0.8, 0.8, 0.8), (0.5, 0.5, 0.5)])
     view = View("corner", "fitted", (8, 8), camera, (light,))
-    captured = captured_view(scene, gl_context, view, vpl_count=4096)
+    captured = captured_view(scene, gl_context, view, point_vpls(vpl_count=4096))
     radiosity = 0.8 * 4.0
     expected = radiosity * corner_form_factor(distance, 1.0, 1.0)
     np.testing.assert_allclose(center_mean(captured.indirect_irradiance, 4), expected, rtol=1e-2)
@@ -110,8 +112,8 @@ def test_floor_beside_an_evenly_lit_wall(gl_context, distance):
 
 @pytest.mark.parametrize(
     "parameters",
-    [{"vpl_count": 8192}, {"vpl_count": 1024, "lloyd_iterations": 4, "falloff_footprint": 1.0}],
-    ids=["points", "cells"],
+    [point_vpls(vpl_count=8192), ArtistParameters(vpl_count=1024, lloyd_iterations=4), ArtistParameters()],
+    ids=["points", "cells", "default"],
 )
 def test_white_furnace(gl_context, parameters):
     """Inside a closed white box lit evenly, one bounce gives back the irradiance that went in.
@@ -130,7 +132,7 @@ def test_white_furnace(gl_context, parameters):
     # From the centre a 90° view covers one wall exactly; a pixel's share of it goes with 1/cos⁴.
     camera = Camera(look_at(np.zeros(3), np.array([0.0, 0.0, -1.0])), float(np.pi / 2.0))
     view = View("furnace", "fitted", (64, 64), camera, (light,))
-    captured = captured_view(scene_of(sides, [(1.0, 1.0, 1.0)]), gl_context, view, **parameters)
+    captured = captured_view(scene_of(sides, [(1.0, 1.0, 1.0)]), gl_context, view, parameters)
     # Pixels of a pinhole image cover equal areas of a plane square to its axis.
     mean = captured.indirect_irradiance.mean(axis=(0, 1))
     np.testing.assert_allclose(mean, 4.0 * np.pi / 24.0, rtol=2e-2)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from built_scenes import colored_room, room_view
 from own_reference import own_reference
+from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
@@ -18,7 +19,9 @@ from vpltune.tuner.surrogate.tabulated_gather import gather_tabulated, tabulate_
 from vpltune.tuner.surrogate.virtual_point_lights import gather_inputs
 from vpltune.tuner.surrogate.vpl_gather import FalloffParameters
 
-PLANTED = ArtistParameters(intensity=1.35, falloff_footprint=0.8, extinction_coefficient=0.7, vpl_count=256)
+PLANTED = point_vpls(intensity=1.35, falloff_footprint=0.8, extinction_coefficient=0.7, vpl_count=256)
+DISCS = ArtistParameters(intensity=1.35, extinction_coefficient=0.7, vpl_count=256)
+"""The default placement, with the radius that a disc has."""
 # The parameters of visibility maps are planted in test_planted_visibility.py.
 WITHOUT_MAPS = TunedConfig(visibility="transmittance")
 
@@ -36,6 +39,12 @@ def planted_views(gl_context):
     return tuple(drawn_by_the_runtime(runtime, light, PLANTED) for light in ("spot", "point"))
 
 
+@pytest.fixture(scope="module")
+def planted_discs(gl_context):
+    runtime = Runtime(colored_room(), context=gl_context)
+    return tuple(drawn_by_the_runtime(runtime, light, DISCS) for light in ("spot", "point"))
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_recovery_from_a_random_start(planted_views, seed):
     """k, α and κ are recovered within 1 % from a random start. Most of the error is that of the table."""
@@ -46,6 +55,16 @@ def test_recovery_from_a_random_start(planted_views, seed):
     assert result.loss <= result.start_loss
     for name in space.names:
         assert getattr(tuned, name) == pytest.approx(getattr(PLANTED, name), rel=1e-2), name
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_recovery_of_discs_from_a_random_start(planted_discs, seed):
+    """Within 2 %: discs' edges cross receivers between the table's nodes of α."""
+    space = SearchSpace()
+    start = space.parameters(np.random.default_rng(seed).random(3), DISCS)
+    tuned = fit_placement(planted_discs, start).parameters
+    for name in space.names:
+        assert getattr(tuned, name) == pytest.approx(getattr(DISCS, name), rel=2e-2), name
 
 
 def test_a_fit_never_ends_above_its_start(planted_views):
@@ -83,7 +102,7 @@ def test_noise_is_not_fitted(planted_views):
             **{**vars(view.reference), "irradiance_a": halves[0], "irradiance_b": halves[1]}
         )
         noisy.append(CapturedView(view.view, reference, view.captured))
-    tuned = fit_placement(noisy, ArtistParameters(vpl_count=256)).parameters
+    tuned = fit_placement(noisy, point_vpls(vpl_count=256)).parameters
     for name in SearchSpace().names:
         assert getattr(tuned, name) == pytest.approx(getattr(PLANTED, name), rel=2e-2), name
 

@@ -26,7 +26,7 @@ from vpltune.tuner.surrogate.vpl_visibility import (
 )
 
 PLANTED = ArtistParameters(
-    intensity=1.3, falloff_footprint=0.6, vpl_count=256, visibility_bias=0.02, visibility_softness=0.2
+    intensity=1.3, falloff_footprint=1.0, vpl_count=256, visibility_bias=0.02, visibility_softness=0.2
 )
 
 

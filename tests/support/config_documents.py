@@ -72,7 +72,7 @@ def any_quality() -> st.SearchStrategy[dict[str, Any]]:
     }
     return st.fixed_dictionaries(
         {
-            "interleave": st.sampled_from(INTERLEAVES),
+            "interleave": st.sampled_from(("auto", *INTERLEAVES)),
             "map_size": st.integers(4, 64),
             "map_refinement": st.sampled_from(MAP_REFINEMENTS),
             "adaptation_frames": st.floats(0.0, 1e4),

@@ -3,15 +3,15 @@
 import numpy as np
 from built_scenes import ROOM_LIGHTS
 from own_reference import own_reference
+from point_vpls import point_vpls
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.scene import Camera, look_at
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
-MANY = ArtistParameters(vpl_count=16384, falloff_footprint=0.1)
+MANY = point_vpls(vpl_count=16384, falloff_footprint=0.1)
 """Whose image stands for the path tracer's: it holds all that falloff and placement can be wrong about."""
 
 DEFAULT = TunedConfig()

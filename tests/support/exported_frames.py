@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 from built_scenes import colored_room
+from point_vpls import point_vpls
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.scene.scene import Texture
@@ -14,7 +14,7 @@ from vpltune.renderer.scene.scene import Texture
 READER = Path(__file__).resolve().parents[2] / "examples" / "standalone_reader.py"
 SCENES = READER.parents[1] / "configs" / "scenes"
 CONFIG = TunedConfig(
-    ArtistParameters(
+    point_vpls(
         intensity=1.3, falloff_footprint=0.8, extinction_coefficient=0.4, vpl_count=200, density_exponent=0.7
     ),
     visibility="transmittance",

@@ -13,6 +13,7 @@ from vpltune.renderer.frame.frame_pass import FrameInputs
 from vpltune.renderer.gpu.camera_uniforms import camera_uniforms
 from vpltune.renderer.scene.light_faces import LightRecords, light_records
 from vpltune.renderer.scene.scene import Camera, Light, Scene
+from vpltune.renderer.scene.sun_faces import SunGrid
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 VECTORS: dict[str, Any] = json.loads((REPOSITORY / "docs" / "test_vectors.json").read_text(encoding="utf-8"))
@@ -45,7 +46,7 @@ def light_of(document: dict[str, Any]) -> Light:
 
 def records_of(light: Light) -> LightRecords:
     """One light and its faces, for the scene of boxes."""
-    return light_records((light,), BOUNDS)
+    return light_records((light,), BOUNDS, SunGrid(1024, (0.0, 0.0, 0.0)))
 
 
 def light_buffers(context: moderngl.Context, light: Light) -> dict[str, moderngl.Buffer]:

@@ -84,7 +84,7 @@ def choose_placement(
 
 def placement_name(parameters: ArtistParameters) -> str:
     """Name of a placement in metrics.json, for example "discs λ=2 γ=1 η=0.5"."""
-    form = f"discs λ={parameters.lloyd_iterations}" if parameters.lloyd_iterations else "points"
+    form = f"discs λ={parameters.lloyd_iterations}" if parameters.vpls_are_discs else "points"
     return f"{form} γ={parameters.density_exponent:g} η={parameters.density_importance:g}"
 
 

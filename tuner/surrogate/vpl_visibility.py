@@ -10,11 +10,7 @@ from jaxtyping import Array, Float, Float32, Int
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.frame.capture import CapturedFrame, VisibilityMaps
-from vpltune.renderer.frame.visibility_map_layout import (
-    FRAME_TURNS_OVER,
-    VISIBILITY_LEAST_LIFT,
-    VISIBILITY_LIFT,
-)
+from vpltune.renderer.frame.visibility_map_layout import FRAME_TURNS_OVER, VISIBILITY_LIFT
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
 
 CHUNK = 128
@@ -141,8 +137,7 @@ def seen_share(overlap: Float[Array, "*shape"], parameters: VisibilityParameters
 
 def visibility_origin(vpls: VirtualPointLights) -> Float[Array, "vpls 3"]:
     """Origin of the rays of each VPL's map [L]. Twin in GLSL."""
-    lift = jnp.maximum(VISIBILITY_LIFT * vpls.footprint, VISIBILITY_LEAST_LIFT)
-    return vpls.position + lift[:, None] * vpls.normal
+    return vpls.position + VISIBILITY_LIFT * vpls.footprint[:, None] * vpls.normal
 
 
 @jax.jit

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vpltune.cli.options import JsonOption
-from vpltune.cli.report import Report
+from vpltune.cli.report import INTERRUPTED, OK, Report, warn
 from vpltune.renderer.errors import InputError
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ def bench(
     name: Annotated[str, typer.Argument(metavar="NAME", help="A benchmark, or `all`.")] = "all",
     json: JsonOption = False,
 ) -> Report:
-    """Run a benchmark: each row has a figure, its baseline and their ratio."""
+    """Run a benchmark: each row has a figure, its baseline and their ratio. Ctrl-C prints the rows so far."""
     try:
         from benchmarks import benchmark_names, run_benchmark
         from benchmarks.harness.machine import machine_description
@@ -31,12 +31,20 @@ def bench(
     known = benchmark_names()
     if name != "all" and name not in known:
         raise InputError(f"bench: NAME must be one of {', '.join([*known, 'all'])}, got {name!r:.60}")
-    rows = []
+    rows, exit_code = [], OK
     with shown_progress() as progress:
-        for chosen in known if name == "all" else (name,):
-            rows += run_benchmark(chosen, progress)
+        try:
+            for chosen in known if name == "all" else (name,):
+                for row in run_benchmark(chosen, progress):
+                    rows.append(row)
+        except KeyboardInterrupt:
+            if not rows:
+                raise
+            exit_code = INTERRUPTED
+    if exit_code:
+        warn((f"interrupted after {len(rows)} row{'s' if len(rows) > 1 else ''}",))
     document = {"machine": machine_description(), "rows": [row.as_dict() for row in rows]}
-    return Report(document, (document["machine"], _table(document["rows"])))
+    return Report(document, (document["machine"], _table(document["rows"])), exit_code)
 
 
 def _table(rows: list[dict]) -> object:
@@ -57,10 +65,15 @@ def _table(rows: list[dict]) -> object:
     for row in rows:
         table.add_row(
             row["name"],
-            f"{row['value']:.4g}",
+            _shown(row["value"], 4),
             row["unit"],
             row["against"],
-            f"{row['against_value']:.4g}",
-            f"{row['ratio']:.3g}",
+            _shown(row["against_value"], 4),
+            _shown(row["ratio"], 3),
         )
     return table
+
+
+def _shown(number: float, digits: int) -> str:
+    """A number as the table has it; a dash where there is none, as in a row that was left out."""
+    return "–" if number != number else f"{number:.{digits}g}"

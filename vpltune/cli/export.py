@@ -157,7 +157,8 @@ def _write_with_view(config: "TunedConfig", to: Form, output: Path, bundle: "Sce
     from vpltune.renderer.export.web_page import web_page
     from vpltune.renderer.files.atomic_file import write_text_whole
 
-    unseen = left_out(config)
+    width, height = bundle.document["view"]["size"]
+    unseen = left_out(config, (width, height))
     warn(unseen)
     if to == "bundle":
         write_bundle(output, bundle)

@@ -33,7 +33,7 @@ def with_flags(
     }
     for name, value in given.items():
         try:
-            Quality(**{name: value})
+            Quality.validated({name: value}, "quality")
         except InputError as error:
             rule = str(error).partition(": ")[2]
             raise InputError(f"--{name.replace('_', '-')}: {rule}") from error

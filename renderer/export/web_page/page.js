@@ -293,12 +293,10 @@ class Frame {
       this.moments.push(makeTarget(w, h, ["RGBA32F", "R32F"]));
     }
     const most = bundle.config.parameters.vpl_count;
-    if (this.programs.vpl_importance) {
-      const [width, height] = [columns, rows].map((texels) => (texels / bundle.rsm.resolution) * bundle.vpl_importance.cells);
-      this.importanceCells = makeTarget(width, height, ["RGBA32F", "RGBA32F"]);
-      this.importanceReceivers = makeTarget(bundle.vpl_importance.receivers, 1, ["RGBA32F", "RGBA32F"]);
-      [this.importance, this.meanImportance] = [makeTarget(width, height, ["R32F"]), makeTarget(1, 1, ["R32F"])];
-    }
+    const cells = [columns, rows].map((texels) => (texels / bundle.rsm.resolution) * bundle.vpl_importance.cells);
+    this.importanceCells = makeTarget(...cells, ["RGBA32F", "RGBA32F"]);
+    this.importanceReceivers = makeTarget(bundle.vpl_importance.receivers, 1, ["RGBA32F", "RGBA32F"]);
+    [this.importance, this.meanImportance] = [makeTarget(...cells, ["R32F"]), makeTarget(1, 1, ["R32F"])];
     const vplTarget = (count, formats = ["RGBA32F", "RGBA32F", "RGBA32F"]) =>
       makeTarget(bundle.vpl_columns, Math.ceil(count / bundle.vpl_columns), formats);
     this.vpls = vplTarget(most);
@@ -395,7 +393,7 @@ class Frame {
 
   // Draw VPLs from the RSM, weighted by importance for the camera if the config asks for it, and cast their maps.
   drawVpls(state, parameters) {
-    if (this.importance && parameters.density_importance > 0) this.measureImportance(state.camera);
+    if (parameters.density_importance > 0) this.measureImportance(state.camera);
     this.sumWeights(state, parameters);
     const { vpl_count, lloyd_iterations } = parameters;
     this.vplsAreDiscs = Boolean(this.samples) && lloyd_iterations > 0;
@@ -413,11 +411,11 @@ class Frame {
     fill(this.importanceReceivers, vpl_importance_receivers, { ...this.cameraValues(camera), ...cells });
     const [receiver_position_valid, receiver_normal_irradiance] = this.importanceReceivers.textures;
     fill(this.importance, vpl_importance, { ...cells, receiver_position_valid, receiver_normal_irradiance });
-    fill(this.meanImportance, vpl_importance_mean, { importance: this.importance.textures[0] });
+    fill(this.meanImportance, vpl_importance_mean, { importance: this.importance.textures[0], cell_position_flux });
   }
 
   weightValues({ density_exponent, density_importance }) {
-    const [importance, mean_importance] = [this.importance, this.meanImportance].map((target) => target?.textures[0]);
+    const [importance, mean_importance] = [this.importance, this.meanImportance].map((target) => target.textures[0]);
     return { ...this.rsmValues, density_exponent, density_importance, importance, mean_importance };
   }
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS
+from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, LARGEST_DISC_COUNT
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.export.scene_bundle import SceneBundle
 from vpltune.renderer.frame import vpl_disc_bounds
@@ -41,14 +41,12 @@ _SHADERS = (
     "web/direct_light.frag",
     "web/material_resolve.frag",
     "web/tone_mapping.frag",
-)
-_DISC_SHADERS = ("web/clustered_discs_owners.frag", "web/clustered_discs.frag", "web/vpl_gather_discs.frag")
-_IMPORTANCE_SHADERS = (
     "web/vpl_importance_cells.frag",
     "web/vpl_importance_receivers.frag",
     "web/vpl_importance.frag",
     "web/vpl_importance_mean.frag",
 )
+_DISC_SHADERS = ("web/clustered_discs_owners.frag", "web/clustered_discs.frag", "web/vpl_gather_discs.frag")
 _MAP_SHADERS = ("web/vpl_visibility_maps.frag",)
 _DETAIL_SHADERS = ("web/vpl_visibility_edges.frag", "web/vpl_visibility_details.frag")
 _HEADER = """#version 300 es
@@ -68,7 +66,11 @@ def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
     """
     if not bundle.document["lights"]:
         raise InputError("web page: the view must have a light")
-    defines = _defines(bundle.document)
+    # One button draws the defaults, which are placed by importance even where the config is not.
+    importance_cells = vpl_importance.importance_cells(len(bundle.document["rsm"]["faces"]))
+    importance = bundle.document["vpl_importance"] | {"cells": importance_cells}
+    drawn = bundle.document | {"vpl_importance": importance}
+    defines = _defines(drawn)
     binary = bundle.binary
     arrays = {name: at for name, at in bundle.document["arrays"].items() if name not in ("lights", "faces")}
     if defines["VISIBILITY_MAP_SIZE"]:
@@ -77,7 +79,7 @@ def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
             content = values.tobytes()
             arrays[name] = {"offset": len(binary), "bytes": len(content)}
             binary += content
-    document = bundle.document | {
+    document = drawn | {
         "vpl_columns": VPL_COLUMNS,
         "data_columns": DATA_COLUMNS,
         "note": ". ".join([NOTE, *left_out]) + ".",
@@ -89,7 +91,7 @@ def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
         "STYLE": _text("page.css"),
         "DOCUMENT": _json(document),
         "BINARY": base64.b64encode(zlib.compress(binary, 9)).decode("ascii"),
-        "SHADERS": _json(_shaders(bundle.document, defines)),
+        "SHADERS": _json(_shaders(drawn, defines)),
         "SCRIPT": _text("page.js") + _text("controls.js"),
     }
     page = _text("page.html")
@@ -146,10 +148,9 @@ def _whole_rows(values: np.ndarray) -> np.ndarray:
 
 def _shaders(document: dict[str, Any], defines: dict[str, Define]) -> dict[str, str]:
     names = _SHADERS
-    if document["clustered_discs"]["steps"] > 0:
+    # The defaults have discs too.
+    if document["config"]["parameters"]["vpl_count"] <= LARGEST_DISC_COUNT:
         names += _DISC_SHADERS
-    if defines["IMPORTANCE_CELLS"]:
-        names += _IMPORTANCE_SHADERS
     if defines["VISIBILITY_MAP_SIZE"]:
         names += _MAP_SHADERS
         if document["visibility_maps"]["map_refinement"] > 1:

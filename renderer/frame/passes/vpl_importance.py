@@ -6,6 +6,8 @@ from vpltune.renderer.frame.rsm_resolution import FEW_FACES
 from vpltune.renderer.gpu.gpu_program import ComputeProgram
 from vpltune.renderer.gpu.render_targets import GBUFFER_READS, RSM_READS, ReflectiveShadowMap
 from vpltune.renderer.gpu.resources import Resources
+from vpltune.renderer.scene.light_faces import face_count
+from vpltune.renderer.scene.scene import Light
 
 CELLS = 64
 """Cells along the side of an RSM face, each with one importance. A choice."""
@@ -20,8 +22,8 @@ DARK_SHARE = 0.01
 """Share of the mean squared irradiance that is added to a receiver's own: a black point is not infinitely
 important."""
 LEAST_IMPORTANCE = 0.05
-"""Share of the mean importance of lit cells that is added to each. Light that seems to matter little is drawn
-seldom, but never not at all, so that the mean stays right and no VPL grows too bright."""
+"""Least share of the VPLs that is drawn by flux alone, whatever η is. Light that seems to matter little is
+drawn seldom, but never not at all, so that the mean stays right and no VPL grows too bright. A choice."""
 DEFINES = {
     "IMPORTANCE_RECEIVERS": RECEIVERS,
     "IMPORTANCE_SPREAD": SPREAD,
@@ -35,9 +37,9 @@ _CELL_BYTES, _RECEIVER_BYTES = 32, 32
 """Bytes of the structures in shaders/common/vpl_importance_form.glsl."""
 
 
-def importance_cells(face_count: int) -> int:
-    """Cells along the side of each of `face_count` RSM faces."""
-    return CELLS if face_count <= FEW_FACES else CELLS_OF_MANY
+def importance_cells(lights: tuple[Light, ...]) -> int:
+    """Cells along the side of each RSM face of these lights."""
+    return CELLS if face_count(lights, nested_faces=0) <= FEW_FACES else CELLS_OF_MANY
 
 
 class VplImportancePass(FramePass):
@@ -49,9 +51,8 @@ class VplImportancePass(FramePass):
 
     name = "vpl_importance"
 
-    def __init__(self, resources: Resources, rsm: ReflectiveShadowMap):
+    def __init__(self, resources: Resources, rsm: ReflectiveShadowMap, cells: int):
         self._rsm = rsm
-        cells = importance_cells(rsm.face_count)
         self._cell_count = rsm.face_count * cells**2
         context, count = resources.context, max(1, self._cell_count)
         resources["importance_cells"] = context.buffer(reserve=count * _CELL_BYTES)
@@ -68,14 +69,14 @@ class VplImportancePass(FramePass):
         self._cells = program("_cells", (*RSM_READS, "importance_receivers"), "importance_cells")
         self._receivers = program("_receivers", (*GBUFFER_READS, "importance_cells"), "importance_receivers")
         self._importance = program("", ("artist_parameters", *RSM_READS, *measured), "vpl_importance")
-        self._factor = program("_factor", ("artist_parameters", *RSM_READS), "vpl_importance")
+        self._factor = program("_factor", ("artist_parameters", *RSM_READS, *measured), "vpl_importance")
 
     def wanted(self, inputs: FrameInputs) -> bool:
         """Where the density heeds it."""
         return inputs.parameters.density_importance > 0.0
 
     def draw(self, inputs: FrameInputs) -> None:
-        """Measure the importance of the light in the RSM, to the power of η."""
+        """Measure the importance of the light in the RSM, and mix it with its flux."""
         uniforms = {**inputs.camera.uniforms, **self._rsm.uniforms, "cell_count": self._cell_count}
         groups = -(-self._cell_count // 64)
         self._cells.dispatch(groups, **uniforms)

@@ -1,7 +1,8 @@
-"""An automatic camera for a scene that has none, chosen by how much it sees.
+"""An automatic camera for a scene that has none, chosen by what it shows (`composition`).
 
 In a room, the camera stands inside, or in front of the open side if there is one. Any other scene counts as
-an object, which the camera looks at from outside. Up is +Y, as in glTF.
+an object, which the camera looks at from outside. Where the subject is much smaller than the scene, as a
+house on a plain, the subject alone counts. Up is +Y, as in glTF.
 """
 
 import math
@@ -9,6 +10,11 @@ import math
 import numpy as np
 from jaxtyping import Float64
 
+from vpltune.renderer.scene.placement.composition import (
+    ENOUGH_SURFACES,
+    Composition,
+    composition,
+)
 from vpltune.renderer.scene.placement.free_places import (
     FROM_FRONT,
     PLACE_DIRECTIONS,
@@ -17,8 +23,9 @@ from vpltune.renderer.scene.placement.free_places import (
     height_fraction,
     is_room,
 )
-from vpltune.renderer.scene.placement.free_space import FreeSpace, free_space, sphere_directions
-from vpltune.renderer.scene.placement.sight import MIDDLE_RAYS, front_facing, lit_fraction, seen_by
+from vpltune.renderer.scene.placement.free_space import FreeSpace, sphere_directions
+from vpltune.renderer.scene.placement.sight import front_facing, lit_fraction, seen_by
+from vpltune.renderer.scene.placement.subject import detail_bounds, subject_space
 from vpltune.renderer.scene.scene import Camera, Light, Scene, look_at
 
 # A choice: vertical field of view inside a room, radians.
@@ -26,12 +33,20 @@ YFOV = math.radians(62.0)
 # A choice: vertical field of view of a camera that looks at an object or into an open side, radians.
 OBJECT_YFOV = math.radians(40.0)
 # A choice: number of best views that are scored again with the rays of a whole image.
-FINALISTS = 32
+FINALISTS = 48
 # A choice: a side of a room is open if at least this share of the rays through it hit a surface, at a median
 # depth of at least this share of the room.
 OPENING_HITS, OPENING_DEPTH = 0.95, 0.4
-# A choice: a surface nearer than this share of the grid's diagonal obstructs the view.
-NEAR = 0.12
+# Choices: a surface obstructs the view if it is nearer than this share of the place's `Places.reach`, or,
+# outside, of the grid's diagonal.
+NEAR_INSIDE, NEAR_OUTSIDE = 0.35, 0.12
+# Choices: inside, a view with this share of detail is as good as with more; the other number keeps a view
+# without any from scoring zero.
+ENOUGH_DETAIL, LEAST_DETAIL = 0.25, 0.1
+# A choice: a surface may fill this share of the image without a penalty.
+LARGEST = 0.35
+# Choices: elevations in degrees and number of azimuths of the cameras around an object.
+ELEVATIONS, AZIMUTHS = (4.0, 14.0, 28.0, 44.0), 8
 # A choice: a camera gains nothing from a directly lit share of the image beyond this.
 ENOUGH_LIT = 0.45
 
@@ -41,14 +56,14 @@ def default_camera(scene: Scene) -> tuple[Camera, str]:
 
     The choice depends on the scene only, and not on its scale.
     """
-    candidates, where = _cameras(free_space(scene))
+    candidates, where = _cameras(subject_space(scene))
     camera = max(candidates, key=lambda candidate: candidate[0])[1]
     return camera, _camera_note(camera, where)
 
 
 def default_camera_for_lights(scene: Scene, lights: tuple[Light, ...]) -> tuple[Camera, str]:
     """Like `default_camera`, but also prefers views in which these lights light much of the image."""
-    space = free_space(scene)
+    space = subject_space(scene)
     candidates, where = _cameras(space)
     shares = [lit_fraction(space, seen_by(space, camera), lights) for _, camera in candidates]
     # Half the lit share weighs as much as half the score. Rounding keeps ties independent of scene scale.
@@ -72,7 +87,7 @@ def _camera_note(camera: Camera, where: str) -> str:
 def _cameras(space: FreeSpace) -> tuple[list[tuple[float, Camera]], str]:
     """Candidate cameras with their scores, and a description of where they stand."""
     if not is_room(space):
-        return _cameras_outside(space), "outside, in a three-quarter view of the whole scene"
+        return _cameras_outside(space), "outside, in a three-quarter view of the subject"
     before_opening = _cameras_before_openings(space)
     if before_opening:
         return before_opening, "in front of the open side, looking in"
@@ -95,18 +110,22 @@ def _cameras_inside(space: FreeSpace, places: Places) -> list[tuple[float, Camer
     log_depth = np.where(places.hit, np.log(depth), 0.0)
     mean_log = log_depth @ inside.T / hits
     spread = np.sqrt(np.maximum(log_depth**2 @ inside.T / hits - mean_log**2, 0.0))
-    diagonal = float(np.linalg.norm(space.shape))
-    # The square root of the visible area, if every surface faced the camera.
-    reach = np.sqrt(np.where(places.front, depth**2, 0.0) @ inside.T / count) / diagonal
-    near = (places.hit & (places.distance < NEAR * diagonal)) @ inside.T / count
+    # Square root of the visible area, if every surface faced the camera.
+    area = np.sqrt(np.where(places.front, depth**2, 0.0) @ inside.T / count)
+    near_distance = NEAR_INSIDE * places.reach()
+    near = (places.hit & (places.distance < near_distance[:, None])) @ inside.T / count
+    detail = places.detail @ inside.T / count
     # A place surrounded by front faces is in a room. A fifth of the directions may be open without penalty,
     # as in a box without a front wall.
     indoors = np.minimum(places.front.mean(axis=1) / 0.8, 1.0) ** 4
     place_weight = indoors * _eye_height_weight(space, places.positions)
+    # An area weighs less in a large room, or an empty hall would win over a furnished room.
+    place_weight /= np.maximum(places.reach(), 1.0) ** 0.25
     score = (
         hit_share**3
         * (0.05 + front_share**2)
-        * reach
+        * np.sqrt(area)
+        * (LEAST_DETAIL + np.minimum(detail, ENOUGH_DETAIL))
         * (1.0 + np.minimum(spread, 0.5))
         * (1.0 - near) ** 3
         * place_weight[:, None]
@@ -117,7 +136,8 @@ def _cameras_inside(space: FreeSpace, places: Places) -> list[tuple[float, Camer
         place, look = divmod(int(flat), len(looks))
         eye = space.to_world(places.positions[place])
         camera = Camera(look_at(eye, eye + space.voxel_world * looks[look]), YFOV)
-        finalists.append((round(_image_score(space, camera) * float(place_weight[place]), 9), camera))
+        seen = composition(space, camera, float(near_distance[place]))
+        finalists.append((_rounded(_indoor_score(seen) * float(place_weight[place])), camera))
     return finalists
 
 
@@ -141,33 +161,27 @@ def _looks() -> tuple[Float64[np.ndarray, "looks 3"], Float64[np.ndarray, "looks
     return np.array(looks), np.array(inside, np.float64)
 
 
-def _image_score(space: FreeSpace, camera: Camera) -> float:
-    """Score of an image: visible front-facing area, variety of depth, and nothing in the way."""
-    sight = seen_by(space, camera)
-    hit = sight.hits.hit
-    if not hit.any():
-        return 0.0
-    rays = (sight.points[hit] - space.to_voxels(camera.position_world)) / np.maximum(
-        sight.hits.distance[hit], 1e-6
-    )[:, None]
-    distance = sight.hits.distance[hit]
-    normals = space.normals.reshape(-1, 3)[sight.hits.voxel[hit]]
-    front = front_facing(space, sight.hits.voxel[hit], rays)
-    # Area per ray is d²/cos θ. The bound on cos θ keeps a floor at a grazing angle from dominating the score.
-    tilt = np.maximum(np.abs((normals * rays).sum(axis=1)), 0.3)
-    seen = math.sqrt(float(np.where(front, distance**2 / tilt, 0.0).sum()) / hit.size)
-    near = float((distance < NEAR * np.linalg.norm(space.shape)).sum()) / hit.size
-    spread = float(np.std(np.log(np.maximum(distance, 0.5))))
-    # Favour a view into the depth of the room over one past a corner.
-    middle = sight.hits.distance[MIDDLE_RAYS]
-    depth_ahead = float(np.where(np.isfinite(middle), middle, 0.0).mean() / np.median(distance))
+def _indoor_score(seen: Composition) -> float:
+    """Score of an image inside a room: much visible area, many surfaces, and a view into the depth."""
     return (
-        sight.hit_fraction**3
-        * seen
-        * (1.0 + min(spread, 0.5))
-        * (1.0 - near) ** 3
-        * min(max(depth_ahead, 0.5), 1.4)
+        seen.hit**3
+        * math.sqrt(seen.area)
+        * _surface_score(seen)
+        * (LEAST_DETAIL + min(seen.detail, ENOUGH_DETAIL))
+        * (1.0 + min(seen.spread, 0.5))
+        * (1.0 - seen.near) ** 3
+        * min(max(seen.depth_ahead, 0.5), 1.4)
     )
+
+
+def _without_excess(largest: float) -> float:
+    """1 for a largest surface up to `LARGEST`, falling to 0 where it fills the image."""
+    return min((1.0 - largest) / (1.0 - LARGEST), 1.0)
+
+
+def _surface_score(seen: Composition) -> float:
+    """Score for many surfaces of which none fills the image."""
+    return math.sqrt(min(seen.surfaces, ENOUGH_SURFACES)) * _without_excess(seen.largest) ** 2
 
 
 def _eye_height_weight(space: FreeSpace, positions: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, " n"]:
@@ -204,12 +218,15 @@ def _cameras_before_openings(space: FreeSpace) -> list[tuple[float, Camera]]:
 
 
 def _cameras_outside(space: FreeSpace) -> list[tuple[float, Camera]]:
-    """Three-quarter views from all around that frame the whole scene."""
-    occupied = np.argwhere(space.occupied) + 0.5
-    target = 0.5 * (occupied.min(axis=0) + occupied.max(axis=0))
+    """Views from all around that frame the whole subject."""
+    low, high = detail_bounds(space)
+    target = 0.5 * (low + high)
+    pieces = np.argwhere(space.detail if space.detail.any() else space.occupied) + 0.5
+    pieces = pieces[((pieces >= low) & (pieces <= high)).all(axis=1)]
+    near = NEAR_OUTSIDE * float(np.linalg.norm(space.shape))
     cameras = []
-    for elevation in np.radians([22.0, 35.0]):
-        for azimuth in 2.0 * math.pi * (np.arange(8) + 0.5) / 8:
+    for elevation in np.radians(ELEVATIONS):
+        for azimuth in 2.0 * math.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS:
             back = np.array(
                 [
                     math.cos(elevation) * math.sin(azimuth),
@@ -217,12 +234,22 @@ def _cameras_outside(space: FreeSpace) -> list[tuple[float, Camera]]:
                     math.cos(elevation) * math.cos(azimuth),
                 ]
             )
-            rotation = look_at(back, np.zeros(3))[:3, :3]
-            local = (occupied - target) @ rotation
+            local = (pieces - target) @ look_at(back, np.zeros(3))[:3, :3]
             tan_y = math.tan(0.5 * OBJECT_YFOV)
-            # Far enough for every voxel to be in the image: z + |y|/tan and z + |x|/(tan · 4/3), plus 2 %.
+            # Far enough for every piece to be in the image: z + |y|/tan and z + |x|/(tan · 4/3), plus 2 %.
             reach = np.maximum(np.abs(local[:, 1]) / tan_y, np.abs(local[:, 0]) / (tan_y * 4.0 / 3.0))
             distance = 1.02 * float((reach + local[:, 2]).max())
             eye = space.to_world(target + distance * back)
-            cameras.append(Camera(look_at(eye, space.to_world(target)), OBJECT_YFOV))
-    return [(round(_image_score(space, camera), 9), camera) for camera in cameras]
+            camera = Camera(look_at(eye, space.to_world(target)), OBJECT_YFOV)
+            cameras.append((_rounded(_outdoor_score(composition(space, camera, near))), camera))
+    return cameras
+
+
+def _outdoor_score(seen: Composition) -> float:
+    """Score of an image of an object: little background, many surfaces."""
+    return seen.hit * (0.05 + seen.front**2) * _surface_score(seen) * (1.0 - seen.near) ** 3
+
+
+def _rounded(score: float) -> float:
+    """Four digits, so that rounding errors of a scaled or moved scene do not decide between equal views."""
+    return float(f"{score:.3e}")

@@ -9,10 +9,10 @@ import math
 import numpy as np
 from jaxtyping import Float64
 
+from vpltune.renderer.scene.placement.bounced_light import bounce_score
 from vpltune.renderer.scene.placement.free_places import CLEARANCE, PLACES, height_fraction, is_room
 from vpltune.renderer.scene.placement.free_space import (
     FreeSpace,
-    free_space,
     march_rays,
     marched,
     sphere_directions,
@@ -21,11 +21,13 @@ from vpltune.renderer.scene.placement.sight import (
     MIDDLE_RAYS,
     SAME_PLACE,
     Sight,
+    frame_of,
     light_hits,
     march_from,
     mean_square_distance_world,
     seen_by,
 )
+from vpltune.renderer.scene.placement.subject import space_of_view
 from vpltune.renderer.scene.scene import Camera, Light, Scene
 
 # A choice: inner and outer half angle of the spot in a room, radians.
@@ -36,6 +38,11 @@ OBJECT_CONE = (math.radians(18.0), math.radians(27.0))
 CONE_DIRECTIONS = 512
 # A choice: the best share of the image to light directly. The rest shows indirect light.
 BEST_LIT = 0.45
+# A choice: number of best spots whose bounced light is estimated.
+FINALISTS = 20
+# A choice: of five axes tried at a place outside, four miss the middle of the view by this share of the outer
+# half angle.
+MISS = 0.7
 # A choice: a surface is overexposed if it is nearer to the light than this share of the RMS distance of all
 # lit surfaces.
 BURNT = 0.45
@@ -49,11 +56,20 @@ def default_light(scene: Scene, camera: Camera) -> tuple[Light, str]:
 
     The choice depends on the scene and the camera only, and not on the scale of the scene.
     """
-    space = free_space(scene)
+    space = space_of_view(scene, camera)
     sight = seen_by(space, camera)
     positions, axes, (inner_cone, outer_cone) = _light_candidates(space, camera, sight)
-    chosen, axis, lit_share = _best_spot(space, sight, positions, axes, outer_cone)
-    light = _spot(space, space.to_world(positions[chosen]), axes[chosen, axis], inner_cone, outer_cone)
+    scores, lit_shares = _spot_scores(space, sight, positions, axes, outer_cone)
+    eye = space.to_voxels(camera.position_world)
+    best, light, lit_share = -1.0, None, 0.0
+    for flat in np.argsort(-np.round(scores, 9).ravel(), kind="stable")[:FINALISTS]:
+        place, axis = divmod(int(flat), axes.shape[1])
+        spot = _spot(space, space.to_world(positions[place]), axes[place, axis], inner_cone, outer_cone)
+        # Rounded, so that rounding errors of a scaled scene do not decide between equal spots.
+        score = round(float(scores[place, axis]) * bounce_score(space, sight, eye, spot), 6)
+        if score > best:
+            best, light, lit_share = score, spot, float(lit_shares[place, axis])
+    assert light is not None
     place = ", ".join(f"{coordinate:.4g}" for coordinate in light.position_world)
     return light, (
         f"light chosen automatically: a {2.0 * math.degrees(outer_cone):.0f}° spot at ({place}); it lights"
@@ -90,7 +106,16 @@ def _light_candidates(
         return positions, np.tile(np.array(axes), (len(positions), 1, 1)), ROOM_CONE
     positions = _places_around(space, eye, center)
     towards = center - positions
-    return positions, (towards / np.linalg.norm(towards, axis=1, keepdims=True))[:, None, :], OBJECT_CONE
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    return positions, np.array([_axes_about(axis) for axis in towards]), OBJECT_CONE
+
+
+def _axes_about(axis: Float64[np.ndarray, "3"]) -> Float64[np.ndarray, "axes 3"]:
+    """The axis, and four that miss its target by `MISS`, so that the edge of the cone crosses the view."""
+    u, v = frame_of(axis)
+    miss = math.tan(MISS * OBJECT_CONE[1])
+    axes = axis + miss * np.array([0.0 * u, u, -u, v, -v])
+    return axes / np.linalg.norm(axes, axis=1, keepdims=True)
 
 
 def _tilted(tilt: float, azimuth: float) -> Float64[np.ndarray, "3"]:
@@ -137,19 +162,19 @@ def _places_around(
                 ]
             )
             for turn in np.radians([45.0, -45.0, 80.0, -80.0, 120.0, -120.0])
-            for elevation in np.radians([35.0, 50.0])
+            for elevation in np.radians([20.0, 35.0, 50.0])
         ]
     )
 
 
-def _best_spot(
+def _spot_scores(
     space: FreeSpace,
     sight: Sight,
     positions: Float64[np.ndarray, "n 3"],
     axes: Float64[np.ndarray, "n axes 3"],
     outer_cone: float,
-) -> tuple[int, int, float]:
-    """Indices of the best spot's position and axis, and the share of the image that it lights.
+) -> tuple[Float64[np.ndarray, "n axes"], Float64[np.ndarray, "n axes"]]:
+    """Score of the spot at each position along each axis, and the share of the image that it lights.
 
     The score is a product. Its factors favour a cone that hits surfaces, none of them so close that they are
     overexposed, a directly lit share of the image near `BEST_LIT`, and a lit middle of the image.
@@ -170,13 +195,9 @@ def _best_spot(
     wanted = np.exp(-(((lit_share - BEST_LIT) / 0.2) ** 2))
     # The constants keep every score above zero, so the least bad spot wins if none is good.
     score = (
-        (hits / count) ** 2
-        * (1.0 - burnt_share) ** 2
-        * (0.02 + wanted)
-        * (0.3 + np.minimum(middle_share, 0.7))
+        (hits / count) * (1.0 - burnt_share) ** 2 * (0.02 + wanted) * (0.3 + np.minimum(middle_share, 0.7))
     )
-    place, axis = np.unravel_index(int(np.round(score, 9).argmax()), score.shape)
-    return int(place), int(axis), float(lit_share[place, axis])
+    return score, lit_share
 
 
 def _lit_shares(

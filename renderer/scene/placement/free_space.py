@@ -5,13 +5,19 @@ therefore the same, and so is every choice made from it.
 """
 
 import functools
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int64
 
-from vpltune.renderer.scene.scene import Scene, transform_points
+from vpltune.renderer.scene.placement.rasterised_surfaces import (
+    DECIMALS,
+    PlacedTriangles,
+    placed_triangles,
+    rasterised,
+    spacing_within_budget,
+)
+from vpltune.renderer.scene.scene import Scene
 
 # A choice: number of voxels in the scene's bounds.
 VOXEL_BUDGET = 64**3
@@ -20,16 +26,6 @@ LONGEST_SIDE = 128
 # A choice: empty voxels around the scene's bounds. The odd fraction keeps surfaces at round fractions of the
 # bounds away from voxel faces.
 MARGIN = 2.37
-# Most surface samples of one grid; scenes that would need more get a coarser grid. 2²⁴ samples take about a
-# second.
-SAMPLE_BUDGET = 2**24
-# A choice: samples processed at a time, to bound memory.
-SAMPLE_CHUNK = 2**20
-# Largest distance between samples in voxels. They can only miss a voxel whose corner is clipped by less.
-SAMPLE_SPACING = 0.3
-# Voxel coordinates are rounded to this many decimals: coarser than double rounding at any scene scale, and
-# much finer than a voxel. Scenes at different scales then give the same grid.
-DECIMALS = 5
 # Shortest march step in voxels. Half a voxel cannot jump over a surface one voxel thick, except at a corner.
 SHORTEST_STEP = 0.5
 
@@ -50,6 +46,10 @@ class FreeSpace:
     """Surface area in the voxel, in squared voxels."""
     normals: Float32[np.ndarray, "nx ny nz 3"]
     """Area-weighted mean of the front-face normals in the voxel. Length 0 (opposing faces cancel) to 1."""
+    albedo: Float32[np.ndarray, "nx ny nz 3"]
+    """Area-weighted mean of the albedo in the voxel, linear; 0 in an empty voxel."""
+    detail: Bool[np.ndarray, "nx ny nz"]
+    """Whether the voxel holds an edge, a curve or small pieces, and not only plain surfaces."""
 
     def to_world(self, positions: Float64[np.ndarray, "*n 3"]) -> Float64[np.ndarray, "*n 3"]:
         """World positions from positions in voxel units."""
@@ -88,99 +88,24 @@ class RayHits:
 def free_space(scene: Scene) -> FreeSpace:
     """The occupancy grid of a scene. The grid of the last scene is cached; scenes are immutable."""
     low, high = scene.bounds()
+    return space_within(placed_triangles(scene), low, high)
+
+
+def space_within(
+    triangles: PlacedTriangles, low: Float64[np.ndarray, "3"], high: Float64[np.ndarray, "3"]
+) -> FreeSpace:
+    """The occupancy grid of the surfaces in the box from `low` to `high` (world units)."""
     extent = high - low
     size = float(extent.max()) or 1.0
     # Treat a flat scene as at least 1/64 as thick as it is long. Otherwise the voxels would shrink with it.
     volume = float(np.prod(np.maximum(extent / size, 1.0 / 64.0)))
     relative_voxel = max((volume / VOXEL_BUDGET) ** (1.0 / 3.0), 1.0 / LONGEST_SIDE)
-    triangles = _triangles_world(scene)
-    while (
-        _sample_counts(triangles, size * relative_voxel).prod(axis=1, dtype=np.float64).sum() > SAMPLE_BUDGET
-    ):
-        relative_voxel *= 1.26
-    voxel = size * relative_voxel
+    voxel = spacing_within_budget(triangles, size * relative_voxel)
     low_world = low - MARGIN * voxel
     shape = np.ceil(np.round(extent / voxel, DECIMALS) + 2.0 * MARGIN).astype(np.int64)
-    area, normals = _rasterised(triangles, low_world, voxel, shape)
-    return FreeSpace(low_world, voxel, area > 0.0, _distance_to_occupied(area > 0.0), area, normals)
-
-
-def _triangles_world(scene: Scene) -> Float64[np.ndarray, "triangles 3 3"]:
-    """Corners of all placed triangles, longest edge first. Mirrored instances keep their front faces."""
-    placed = []
-    for instance in scene.instances:
-        mesh = scene.meshes[instance.mesh]
-        corners = transform_points(instance.to_world, mesh.positions)[mesh.triangles]
-        placed.append(corners[:, ::-1] if np.linalg.det(instance.to_world[:3, :3]) < 0.0 else corners)
-    corners = np.concatenate(placed) if placed else np.zeros((0, 3, 3))
-    edges = np.linalg.norm(corners[:, [1, 2, 0]] - corners, axis=2)
-    # Rounded so that the choice between equal edges does not depend on the scene's scale.
-    relative = edges / np.maximum(edges.max(axis=1, keepdims=True), np.finfo(np.float64).tiny)
-    first = np.round(relative, 6).argmax(axis=1)
-    order = (first[:, None] + np.arange(3)) % 3
-    return np.take_along_axis(corners, order[:, :, None], axis=1)
-
-
-def _sample_counts(
-    triangles: Float64[np.ndarray, "triangles 3 3"], voxel: float
-) -> Int64[np.ndarray, "triangles 2"]:
-    """Number of samples along the longest edge and across it, at most `SAMPLE_SPACING` apart."""
-    edge = triangles[:, 1] - triangles[:, 0]
-    length = np.linalg.norm(edge, axis=1)
-    twice_area = np.linalg.norm(np.cross(edge, triangles[:, 2] - triangles[:, 0]), axis=1)
-    height = np.divide(twice_area, length, out=np.zeros_like(length), where=length > 0.0)
-    spacing = SAMPLE_SPACING * voxel
-    return np.ceil(np.round(np.stack([length, height], axis=1) / spacing, DECIMALS)).astype(np.int64) + 1
-
-
-def _surface_samples(
-    triangles: Float64[np.ndarray, "triangles 3 3"], voxel: float
-) -> Iterator[tuple[Int64[np.ndarray, " n"], Float64[np.ndarray, "n 3"], Float64[np.ndarray, " n"]]]:
-    """Sample points in rows along each longest edge: triangle, position, share of the triangle's area."""
-    counts = _sample_counts(triangles, voxel)
-    per_triangle = counts.prod(axis=1)
-    ends = np.cumsum(per_triangle)
-    total = int(ends[-1]) if len(ends) else 0
-    for start in range(0, total, SAMPLE_CHUNK):
-        sample = np.arange(start, min(start + SAMPLE_CHUNK, total))
-        triangle = np.searchsorted(ends, sample, side="right")
-        within = sample - (ends - per_triangle)[triangle]
-        along, across = counts[triangle].T
-        s = (within % along) / np.maximum(along - 1, 1)
-        t = (within // along) / np.maximum(across - 1, 1)
-        a, b, c = triangles[triangle].transpose(1, 0, 2)
-        base = a + s[:, None] * (b - a)
-        # Rows get narrower towards the apex, and so do the shares of their samples. The shares add up to 1.
-        share = 2.0 * (1.0 - t + 0.5 / across) / ((along * (across + 1)).astype(np.float64))
-        yield triangle, base + t[:, None] * (c - base), share
-
-
-def _rasterised(
-    triangles: Float64[np.ndarray, "triangles 3 3"],
-    low_world: Float64[np.ndarray, "3"],
-    voxel: float,
-    shape: Int64[np.ndarray, "3"],
-) -> tuple[Float32[np.ndarray, "nx ny nz"], Float32[np.ndarray, "nx ny nz 3"]]:
-    """Area and mean front-face normal in each voxel. A voxel is occupied if its area is positive."""
-    cells = int(shape.prod())
-    touched = np.zeros(cells)
-    area = np.zeros(cells)
-    normal_sum = np.zeros((3, cells))
-    area_vector = (
-        0.5 * np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) / voxel**2
-    )
-    triangle_area = np.linalg.norm(area_vector, axis=1)
-    for triangle, positions, share in _surface_samples(triangles, voxel):
-        index = np.floor(np.round((positions - low_world) / voxel, DECIMALS)).astype(np.int64)
-        flat = np.ravel_multi_index(tuple(np.clip(index, 0, shape - 1).T), tuple(shape))
-        touched += np.bincount(flat, minlength=cells)
-        area += np.bincount(flat, weights=share * triangle_area[triangle], minlength=cells)
-        for axis in range(3):
-            normal_sum[axis] += np.bincount(flat, share * area_vector[triangle, axis], minlength=cells)
-    # A degenerate triangle has no area; 1e-6 keeps its voxels occupied.
-    area = np.where(touched > 0.0, np.maximum(area, 1e-6), 0.0)
-    normals = np.round(normal_sum / np.maximum(area, 1e-6), 3).T
-    return area.reshape(shape).astype(np.float32), normals.reshape(*shape, 3).astype(np.float32)
+    area, normals, albedo, detail = rasterised(triangles, low_world, voxel, shape)
+    clearance = _distance_to_occupied(area > 0.0)
+    return FreeSpace(low_world, voxel, area > 0.0, clearance, area, normals, albedo, detail)
 
 
 def _distance_to_occupied(occupied: Bool[np.ndarray, "nx ny nz"]) -> Float32[np.ndarray, "nx ny nz"]:

@@ -28,8 +28,8 @@ from jaxtyping import Float64
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.placement.automatic_camera import default_camera, default_camera_for_lights
 from vpltune.renderer.scene.placement.automatic_light import default_light
-from vpltune.renderer.scene.placement.free_space import free_space
 from vpltune.renderer.scene.placement.sight import lit_fraction, seen_by
+from vpltune.renderer.scene.placement.subject import space_of_view
 from vpltune.renderer.scene.scene import Camera, Light, LightKind, Scene, look_at
 from vpltune.renderer.scene.views import check_cone
 
@@ -115,7 +115,7 @@ def resolve_camera_and_lights(
     if own_lights:
         return camera, lights, tuple(notes)
     if lights:
-        space = free_space(scene)
+        space = space_of_view(scene, camera)
         if lit_fraction(space, seen_by(space, camera), lights) >= LEAST_LIT:
             return camera, lights, tuple(notes)
         notes.append(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
-from vpltune.renderer.scene.placement.free_space import FreeSpace, free_space, march_rays
+from vpltune.renderer.scene.placement.free_space import FreeSpace, march_rays
 from vpltune.renderer.scene.placement.sight import (
     Sight,
     frame_of,
@@ -16,6 +16,7 @@ from vpltune.renderer.scene.placement.sight import (
     mean_square_distance_world,
     seen_by,
 )
+from vpltune.renderer.scene.placement.subject import space_of_view
 from vpltune.renderer.scene.scene import Camera, Light, Scene, look_at
 from vpltune.renderer.scene.views import Split, View
 
@@ -88,7 +89,7 @@ def views_for_scene(
             "views_for_scene: fitted must be ≥ 1, validation and held_out ≥ 0, "
             f"got {fitted}, {validation} and {held_out}"
         )
-    space = free_space(scene)
+    space = space_of_view(scene, camera)
     sight = seen_by(space, camera)
     start = _Start(space, camera, lights, sight, lit_fraction(space, sight, lights))
     views = [View("fitted_0", "fitted", size, camera, lights)]

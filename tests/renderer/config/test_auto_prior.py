@@ -43,9 +43,10 @@ def test_the_schema_takes_it():
 
 
 def test_the_shipped_prior():
-    """`auto` is a preset; it sees by maps, and what it says lies within every bound."""
+    """`auto` is a preset for discs that see by maps, and what it says lies within every bound."""
     config = read_config("auto")
     assert config.visibility == "maps"
+    assert config.parameters.vpls_are_discs
     assert config.auto is not None
     for statistics in (np.zeros(len(STATISTIC_NAMES)), np.ones(len(STATISTIC_NAMES))):
         found = config.auto.parameters(statistics, config.parameters)
@@ -90,11 +91,14 @@ def test_a_prior_goes_with_maps():
         CONFIG.seen_by("transmittance")
 
 
-def test_a_prior_goes_with_points():
-    broken = document()
-    broken["quality"]["lloyd_iterations"] = 4
-    with pytest.raises(InputError, match="key 'auto' goes with quality.lloyd_iterations 0, .* got 4"):
-        parse_config(json.dumps(broken), "auto.json")
+@pytest.mark.parametrize("iterations", [0, 2, 4])
+def test_a_prior_is_read_with_any_placement(iterations):
+    """It is trained for clustered discs; files of version 1 have one with points."""
+    changed = document()
+    changed["quality"]["lloyd_iterations"] = iterations
+    config = parse_config(json.dumps(changed), "auto.json")
+    assert config.auto == CONFIG.auto
+    assert config.parameters.lloyd_iterations == iterations
 
 
 @pytest.mark.parametrize("form", ["glsl", "c", "std140"])

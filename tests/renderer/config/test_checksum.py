@@ -7,6 +7,7 @@ import pytest
 from config_documents import any_document, document, older_document
 from hypothesis import given, settings
 from made_priors import made_prior
+from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.gltf_extras import write_gltf_extras
@@ -169,4 +170,5 @@ def test_a_config_in_a_gltf_file_is_checked_too(tmp_path):
 
 def test_an_older_file_has_none_and_its_successor_has():
     config = parse_config(json.dumps(older_document()), "text")
-    assert written(config)["checksum"] == written(TunedConfig())["checksum"]
+    points = TunedConfig(point_vpls(), quality=Quality(interleave=1))
+    assert written(config)["checksum"] == written(points)["checksum"]

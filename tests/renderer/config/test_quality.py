@@ -16,7 +16,10 @@ from vpltune.renderer.errors import InputError
 BUDGET = {"milliseconds": 4.0, "frame_size": [640, 480], "machine": "llvmpipe"}
 
 RULES = {
-    "interleave": ("must be one of 1, 2, 4, 8", (0, 3, 5, 16, -1, 2.5, True, "4", None, math.nan, 10**400)),
+    "interleave": (
+        "must be one of auto, 1, 2, 4, 8",
+        (0, 3, 5, 16, -1, 2.5, True, "4", "full", None, math.nan, 10**400),
+    ),
     "map_size": (
         "must be a whole number from 4 to 64",
         (3, 65, 0, -4, 24.5, True, "24", None, math.inf, 10**400),
@@ -68,7 +71,7 @@ def test_a_resolution_that_is_left_out_is_no_resolution_that_is_null():
 
 def test_bounds_are_allowed():
     for name, values in {
-        "interleave": INTERLEAVES,
+        "interleave": ("auto", *INTERLEAVES),
         "map_size": (4, 64),
         "map_refinement": MAP_REFINEMENTS,
         "rsm_resolution": (64, 8192),
@@ -154,13 +157,39 @@ def test_whole_numbers_may_be_written_as_fractions_and_fractions_as_whole_number
     assert type(quality.map_size) is int and type(quality.adaptation_frames) is float
 
 
-def test_blocks_are_no_larger_than_vpls_go_round():
-    asked = Quality(interleave=8)
-    assert [asked.interleave_for(count) for count in (1, 3, 4, 15, 16, 63, 64, 1024)] == [
-        *(1, 1, 2, 2, 4, 4, 8, 8)
-    ]
-    assert Quality(interleave=2).interleave_for(1024) == 2
-    assert Quality(interleave=4).interleave_for(0) == 1
+LARGE = (1920, 1080)
+"""A frame in pixels of which `auto` takes its largest blocks."""
+
+
+@pytest.mark.parametrize(("side", "largest"), [(8, 8), ("auto", 4)])
+def test_blocks_are_no_larger_than_vpls_go_round(side, largest):
+    asked = Quality(interleave=side)
+    expected = [min(largest, by_count) for by_count in (1, 1, 1, 2, 2, 4, 4, 8, 8)]
+    assert [asked.interleave_for(n, LARGE) for n in (0, 1, 3, 4, 15, 16, 63, 64, 1024)] == expected
+
+
+@pytest.mark.parametrize("side", INTERLEAVES)
+def test_a_side_that_is_asked_for_does_not_follow_the_frame(side):
+    assert {Quality(interleave=side).interleave_for(1024, size) for size in ((1, 1), (64, 48), LARGE)} == {
+        side
+    }
+
+
+@pytest.mark.parametrize(
+    ("size", "side"),
+    [
+        ((1, 1), 1),
+        ((160, 90), 1),
+        ((319, 180), 1),
+        ((320, 180), 2),
+        ((180, 320), 2),
+        ((639, 360), 2),
+        ((640, 360), 4),
+        ((16384, 16384), 4),
+    ],
+)
+def test_auto_blocks_follow_the_pixels_of_the_frame(size, side):
+    assert Quality().interleave_for(512, size) == side
 
 
 def test_the_schema_knows_every_member_and_its_default():

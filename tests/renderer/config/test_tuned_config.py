@@ -131,6 +131,7 @@ def test_configs_that_draw_alike():
         TunedConfig(ArtistParameters(intensity=2.0)),
         TunedConfig(visibility="transmittance"),
         TunedConfig(quality=Quality(interleave=2)),
+        TunedConfig(ArtistParameters(lloyd_iterations=0)),
         read_config("auto"),
     ):
         assert not config.draws_as(other)
@@ -140,7 +141,7 @@ def test_a_full_gather_changes_the_interleaving_alone():
     quality = Quality(interleave=8, map_size=12, rsm_resolution=128, adaptation_frames=0.0)
     config = TunedConfig(ArtistParameters(vpl_count=7), visibility="transmittance", quality=quality)
     full = config.with_full_gather()
-    assert full.quality == Quality(map_size=12, rsm_resolution=128, adaptation_frames=0.0)
+    assert full.quality == Quality(interleave=1, map_size=12, rsm_resolution=128, adaptation_frames=0.0)
     assert (full.parameters, full.visibility) == (config.parameters, config.visibility)
 
 

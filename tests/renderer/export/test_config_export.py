@@ -87,7 +87,7 @@ def test_codes_of_the_visibility_are_those_that_shaders_were_written_for():
 @pytest.mark.parametrize(
     ("quality", "expected"),
     [
-        (Quality(), {"INTERLEAVE": 1, "MAP_SIZE": 24, "MAP_REFINEMENT": 4, "RSM_RESOLUTION": 0}),
+        (Quality(), {"INTERLEAVE": 0, "MAP_SIZE": 24, "MAP_REFINEMENT": 4, "RSM_RESOLUTION": 0}),
         (
             Quality(interleave=8, map_size=12, map_refinement=1, rsm_resolution=512),
             {"INTERLEAVE": 8, "MAP_SIZE": 12, "MAP_REFINEMENT": 1, "RSM_RESOLUTION": 512},
@@ -95,7 +95,7 @@ def test_codes_of_the_visibility_are_those_that_shaders_were_written_for():
     ],
 )
 def test_the_quality_settings_are_constants_too(quality, expected):
-    """A resolution of 0 texels leaves it to who reads it."""
+    """Interleaving or a resolution of 0 leaves it to who reads it."""
     config = TunedConfig(quality=quality)
     for text, pattern in (
         (glsl_constants(config), r"^const int VPL_(\w+) = (\d+);$"),

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from point_vpls import point_vpls
 from vector_file import BOUNDS, DIAGONAL, VECTORS, boxes, light_of
 
 from examples.formulas import visibility_maps
@@ -29,7 +30,7 @@ from vpltune.renderer.scene.scene import Camera, look_at
 RESOLUTION = 64
 LIGHT = VECTORS["rsm"]["light"]
 BOXES = VECTORS["boxes"]
-POINTS = ArtistParameters(
+POINTS = point_vpls(
     vpl_count=16,
     intensity=1.3,
     falloff_footprint=0.7,
@@ -95,7 +96,7 @@ def placed(parameters: ArtistParameters, captured) -> tuple[Vpls, float]:
 def cast_map(vpl: dict, length: float, size: int, refinement: int) -> dict[str, np.ndarray]:
     """The map of one VPL, by rays through the boxes."""
     frame = visibility_maps.hemisphere_frame(vpl["normal"])
-    origin = visibility_maps.map_origin(vpl["position"], vpl["normal"], vpl["footprint"], length)
+    origin = visibility_maps.map_origin(vpl["position"], vpl["normal"], vpl["footprint"])
 
     def cast(side: int) -> tuple[np.ndarray, np.ndarray]:
         end, normal = np.zeros((side, side, 3)), np.zeros((side, side, 3))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from glsl_results import glsl_results
+from point_vpls import point_vpls
 from vector_file import (
     PI,
     VECTORS,
@@ -114,7 +115,7 @@ def place(resources, rsm, parameters, filtering=5, rotation=(0.0, 0.0), cells=1)
 
 def test_flux_and_length_of_the_scene(resources, rsm):
     """They do not depend on the density that VPLs are drawn with."""
-    place(resources, rsm, ArtistParameters(vpl_count=16, density_exponent=0.5))
+    place(resources, rsm, point_vpls(vpl_count=16, density_exponent=0.5))
     statistics = np.frombuffer(resources.read("frame_statistics"), np.float32)
     assert statistics[1] == pytest.approx(RSM["total_flux"], rel=RTOL)
     assert statistics[2] == pytest.approx(RSM["scene_length"], rel=RTOL)
@@ -124,7 +125,7 @@ def test_flux_and_length_of_the_scene(resources, rsm):
 @pytest.mark.parametrize("case", VECTORS["placement"], ids=range(len(VECTORS["placement"])))
 def test_placement(resources, rsm, case):
     """To 2e-3: what the inversion leaves over is the quotient of two small differences."""
-    parameters = ArtistParameters(vpl_count=case["vpl_count"], density_exponent=case["density_exponent"])
+    parameters = point_vpls(vpl_count=case["vpl_count"], density_exponent=case["density_exponent"])
     place(resources, rsm, parameters, case["filtering"], tuple(case["rotation"]))
     assert_same_vpls(resources.read("virtual_point_lights"), case["vpls"], 2e-3)
 
@@ -158,7 +159,7 @@ def measured(gl_context, resources):
     return defines, {
         "cells": program("_cells", (*RSM_READS, both[1]), both[0]),
         "importance": program("", ("artist_parameters", *RSM_READS, *both), "vpl_importance"),
-        "factor": program("_factor", ("artist_parameters", *RSM_READS), "vpl_importance"),
+        "factor": program("_factor", ("artist_parameters", *RSM_READS, *both), "vpl_importance"),
     }
 
 
@@ -200,7 +201,7 @@ def test_importance(gl_context, resources, rsm, measured):
     factors = np.frombuffer(resources.read("vpl_importance"), np.float32).reshape(cells, cells)
     np.testing.assert_allclose(factors, IMPORTANCE["factor"], rtol=1e-3)
 
-    parameters = ArtistParameters(vpl_count=16, density_importance=IMPORTANCE["density_importance"])
+    parameters = point_vpls(vpl_count=16, density_importance=IMPORTANCE["density_importance"])
     place(resources, rsm, parameters, cells=cells)
     assert_same_vpls(resources.read("virtual_point_lights"), IMPORTANCE["vpls"], 3e-3)
 

@@ -13,7 +13,8 @@ from vector_file import BOUNDS, DIAGONAL, PI, REPOSITORY, VECTORS, light_buffers
 
 from vpltune.renderer.frame import vpl_disc_bounds
 from vpltune.renderer.frame.point_table import r2_sequence
-from vpltune.renderer.scene.light_faces import FaceSnapping, light_records
+from vpltune.renderer.scene.light_faces import light_records
+from vpltune.renderer.scene.sun_faces import SunGrid
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
 from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, gather
 
@@ -57,8 +58,8 @@ def test_point_table():
     "case", VECTORS["faces"], ids=lambda case: f"{len(case['faces'])}-{case['light']['type']}"
 )
 def test_faces_of_lights(case):
-    snapping = FaceSnapping(DIAGONAL, case["resolution"])
-    records = light_records((light_of(case["light"]),), BOUNDS, snapping).faces
+    grid = SunGrid(case["resolution"], (0.0, 0.0, 0.0), length=DIAGONAL)
+    records = light_records((light_of(case["light"]),), BOUNDS, grid).faces
     assert len(records) == len(case["faces"])
     for record, face in zip(records, case["faces"], strict=True):
         np.testing.assert_allclose(record["light_to_world"].T, face["light_to_world"], atol=1e-6)

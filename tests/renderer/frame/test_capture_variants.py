@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from built_scenes import colored_room, room_view
 from made_priors import made_prior
+from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, placement
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 
-START = ArtistParameters(vpl_count=64)
+START = point_vpls(vpl_count=64)
 DISCS = replace(START, lloyd_iterations=2, density_importance=0.5, falloff_footprint=1.0)
 OTHERS = (
     replace(START, intensity=2.0, falloff_footprint=1.5),

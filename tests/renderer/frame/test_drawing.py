@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from built_scenes import colored_room, room_view
 from made_priors import made_prior
+from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.parameter_block import BLOCK_BYTES
@@ -24,7 +25,7 @@ from vpltune.renderer.scene.dynamic_lights import DynamicLights, point_lights
 SIZE = (24, 18)
 VIEW = room_view("spot", SIZE)
 QUALITY = Quality(map_size=8, rsm_resolution=64)
-PLAIN = TunedConfig(ArtistParameters(vpl_count=64), quality=QUALITY)
+PLAIN = TunedConfig(point_vpls(vpl_count=64), quality=QUALITY)
 LIGHTS = DynamicLights(point_lights(np.array([[0.2, 0.3, 0.4]]), np.full(3, 0.3), 1.5))
 
 
@@ -38,6 +39,7 @@ def with_quality(**changes) -> TunedConfig:
 
 CONFIGS = {
     "plain": PLAIN,
+    "default": TunedConfig(ArtistParameters(vpl_count=64), quality=QUALITY),
     "brighter": with_parameters(intensity=2.0),
     "softer": with_parameters(falloff_footprint=4.0, extinction_coefficient=0.5),
     "other maps": with_parameters(visibility_bias=0.05, visibility_softness=0.4),

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
 from made_priors import made_prior
+from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
@@ -118,7 +119,7 @@ def test_parameters_that_are_given_are_not_read_back_either(gl_context, calls):
 )
 def test_techniques_that_a_config_asks_for_read_nothing_back(gl_context, calls, changes):
     """VPLs are clustered, placed and completed on the GPU; all buffers are there after one frame."""
-    config = TunedConfig(ArtistParameters(vpl_count=64, **changes), quality=Quality(rsm_resolution=64))
+    config = TunedConfig(point_vpls(vpl_count=64, **changes), quality=Quality(rsm_resolution=64))
     runtime = Runtime(colored_room(), context=gl_context)
     runtime.draw(everything_view(), config)
     calls.clear()
@@ -131,10 +132,8 @@ def test_two_configs_in_turn_read_and_allocate_nothing(gl_context, calls):
     """The frames of both are kept, and so are the programs for points and discs."""
     quality = Quality(rsm_resolution=64)
     configs = [
-        TunedConfig(ArtistParameters(vpl_count=64), quality=quality),
-        TunedConfig(
-            ArtistParameters(vpl_count=32, lloyd_iterations=2), visibility="transmittance", quality=quality
-        ),
+        TunedConfig(point_vpls(vpl_count=64), quality=quality),
+        TunedConfig(ArtistParameters(vpl_count=32), visibility="transmittance", quality=quality),
     ]
     runtime = Runtime(colored_room(), context=gl_context)
     for config in configs:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from built_scenes import quad, scene_of
+from point_vpls import point_vpls
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.point_table import POISSON_RADIUS, point_table, poisson_disc, r2_sequence
@@ -62,7 +62,7 @@ def deviation(gl_context, table: str, density_exponent: float) -> float:
         RuntimeOptions(point_table=table),
         context=gl_context,
     )
-    parameters = ArtistParameters(vpl_count=256, density_exponent=density_exponent)
+    parameters = point_vpls(vpl_count=256, density_exponent=density_exponent)
     config = TunedConfig(parameters, quality=Quality(rsm_resolution=256))
     rotations = [(float(u), float(v)) for u, v in np.random.default_rng(0).random((64, 2))]
     frames = runtime.captures(view, config, rotations)

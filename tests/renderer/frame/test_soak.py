@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS
 from moving_scenes import bent_board
+from point_vpls import point_vpls
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -39,7 +39,7 @@ class Soak:
         self.scene = bent_board(seconds_per_turn=4.0)
         # The smallest map that a config may ask for.
         quality = Quality(interleave=2, rsm_resolution=64)
-        self.config = TunedConfig(ArtistParameters(vpl_count=64, screen_space_strength=1.0), quality=quality)
+        self.config = TunedConfig(point_vpls(vpl_count=64, screen_space_strength=1.0), quality=quality)
         self.runtime = Runtime(self.scene, RuntimeOptions(light_path="tiles"), context=context)
         camera = Camera(look_at(np.array([0.0, 0.0, 3.6]), np.zeros(3)), float(np.radians(40.0)))
         lights = tuple(ROOM_LIGHTS[kind] for kind in ("spot", "point", "directional"))

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
 from made_priors import made_prior
+from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
@@ -336,7 +337,7 @@ def test_one_text_is_compiled_once_for_each_context(resources, shaders, compiled
 def everything() -> tuple[View, TunedConfig, DynamicLights]:
     view = room_view("spot", (32, 24))
     lights = DynamicLights(point_lights(np.zeros((4, 3)), np.full(3, 0.05), 0.5))
-    parameters = ArtistParameters(vpl_count=64, density_importance=0.5, screen_space_strength=1.0)
+    parameters = point_vpls(vpl_count=64, density_importance=0.5, screen_space_strength=1.0)
     config = TunedConfig(
         parameters, auto=made_prior(), quality=Quality(interleave=4, map_size=8, rsm_resolution=64)
     )

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS
 
-from vpltune.renderer.scene.light_faces import SIZE_STEP, FaceSnapping, face_count, light_records
+from vpltune.renderer.scene.light_faces import face_count, light_records
 from vpltune.renderer.scene.scene import Light
+from vpltune.renderer.scene.sun_faces import SIZE_STEP, SunGrid
 
-SNAPPING = FaceSnapping(length=5.0, cells=256)
+TIGHT = SunGrid(256, (0.0, 0.0, 0.0))
+SNAPPED = SunGrid(256, (0.0, 0.0, 0.0), length=5.0)
 
 
 def sun(direction):
@@ -23,12 +25,12 @@ def corners_on_face(record, bounds):
     return ((corners - matrix[:3, 3]) @ matrix[:3, :3])[:, :2] / record["extent"]
 
 
-@pytest.mark.parametrize("snapping", [None, SNAPPING])
-def test_a_suns_face_holds_all_bounds(snapping):
+@pytest.mark.parametrize("grid", [TIGHT, SNAPPED], ids=["tight", "snapped"])
+def test_a_suns_face_holds_all_bounds(grid):
     random = np.random.default_rng(2)
     for _ in range(200):
         bounds = np.sort(random.normal(size=(2, 3)) * 10.0 ** random.uniform(-2, 2), axis=0)
-        (face,) = light_records((sun(random.normal(size=3)),), bounds, snapping).faces
+        (face,) = light_records((sun(random.normal(size=3)),), bounds, grid).faces
         assert np.abs(corners_on_face(face, bounds)).max() < 1.0
 
 
@@ -38,14 +40,14 @@ def test_a_snapped_grid_stands_still_while_bounds_move():
     faces = []
     for growth in np.linspace(0.0, 2.0, 101):
         bounds = np.array([[-1.0, 0.0, -1.0], [1.0 + growth, 0.5 + 0.7 * growth, 1.0]])
-        faces.append(light_records((light,), bounds, SNAPPING).faces[0])
+        faces.append(light_records((light,), bounds, SNAPPED).faces[0])
     extents = np.array([face["extent"] for face in faces], np.float64)
     assert len(np.unique(extents, axis=0)) < 15
-    steps = np.log(extents / SNAPPING.length) / np.log(SIZE_STEP)
+    steps = np.log(extents / 5.0) / np.log(SIZE_STEP)
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-5)
     matrices = np.array([face["light_to_world"].T for face in faces], np.float64)
     across = np.einsum("nij,ni->nj", matrices[:, :3, :3], matrices[:, :3, 3])[:, :2]
-    cells = across / (2.0 * extents / SNAPPING.cells)
+    cells = across / (2.0 * extents / SNAPPED.cells)
     # 1e-3 of a cell: faces are stored in float32.
     np.testing.assert_allclose(cells, np.round(cells), atol=1e-3)
 
@@ -54,9 +56,11 @@ def test_snapping_costs_little_size():
     bounds = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
     for tilt in np.linspace(0.0, 1.5, 20):
         light = sun([np.sin(tilt), -np.cos(tilt), 0.1])
-        fitted, snapped = (light_records((light,), bounds, s).faces[0]["extent"] for s in (None, SNAPPING))
-        assert (snapped >= fitted).all()
-        assert (snapped <= fitted * SIZE_STEP * 1.01).all()
+        fitted, snapped = (
+            light_records((light,), bounds, grid).faces[0]["extent"] for grid in (TIGHT, SNAPPED)
+        )
+        assert (snapped["extent"] >= fitted["extent"]).all()
+        assert (snapped["extent"] <= fitted["extent"] * SIZE_STEP * 1.01).all()
 
 
 def test_a_turning_light_turns_its_face_smoothly():
@@ -69,7 +73,7 @@ def test_a_turning_light_turns_its_face_smoothly():
     for heading in (0.0, 0.7, 1.9):
         angles = np.linspace(-1.5, 1.5, 301)
         faces = [
-            light_records((dataclasses.replace(spot, direction_world=direction),), bounds).faces[0]
+            light_records((dataclasses.replace(spot, direction_world=direction),), bounds, TIGHT).faces[0]
             for angle in angles
             for direction in [
                 np.array([np.sin(angle) * np.cos(heading), -np.cos(angle), np.sin(angle) * np.sin(heading)])
@@ -86,7 +90,7 @@ def test_any_direction_has_a_rigid_face(direction):
     light = dataclasses.replace(
         ROOM_LIGHTS["spot"], direction_world=np.array(direction) / np.linalg.norm(direction)
     )
-    (face,) = light_records((light,), np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])).faces
+    (face,) = light_records((light,), np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]]), TIGHT).faces
     rotation = face["light_to_world"][:3, :3].T.astype(np.float64)
     np.testing.assert_allclose(rotation.T @ rotation, np.eye(3), atol=1e-6)
     assert np.linalg.det(rotation) > 0.0
@@ -96,7 +100,9 @@ def test_any_direction_has_a_rigid_face(direction):
 def test_faces_are_counted_without_a_scene():
     lights = tuple(ROOM_LIGHTS.values())
     bounds = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
-    assert face_count(lights) == len(light_records(lights, bounds).faces) == 1 + 5 + 6 + 1
+    for nested in (0, 2):
+        grid = SunGrid(256, (0.0, 0.0, 0.0), nested)
+        assert face_count(lights, nested) == len(light_records(lights, bounds, grid).faces) == 13 + nested
 
 
 @pytest.mark.parametrize("direction", [[0.0, -2.0, 0.0], [0.0, 0.0, 0.0], [np.nan, 0.0, 1.0]])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, quad, scene_of
+from point_vpls import point_vpls
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import read_image
@@ -17,7 +17,7 @@ from vpltune.renderer.techniques.ray_traced_instant_radiosity import RayTracedIn
 from vpltune.renderer.techniques.screen_space_only import ScreenSpaceOnly
 from vpltune.renderer.techniques.vpls_readback import VplsReadback
 
-PARAMETERS = ArtistParameters(vpl_count=1024, falloff_footprint=0.5)
+PARAMETERS = point_vpls()
 ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.15, 0.45))
 
 

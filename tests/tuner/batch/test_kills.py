@@ -15,6 +15,7 @@ import pytest
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig, write_config
 from vpltune.tuner.batch.record import Records
+from vpltune.tuner.fitting.fit_density import FEW_VPLS
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 # Choices: kills in all, and scenes in the library.
@@ -34,7 +35,7 @@ def library(tmp_path_factory):
         renamed = content.replace(b'"generator":"VPLtune', b'"generator":"VPLtun%d' % index)
         assert renamed != content
         (folder / f"scene{index}.glb").write_bytes(renamed)
-    write_config(folder / "small.json", TunedConfig(ArtistParameters(vpl_count=64)))
+    write_config(folder / "small.json", TunedConfig(ArtistParameters(vpl_count=FEW_VPLS + 1)))
     return folder
 
 

@@ -156,7 +156,7 @@ def test_the_key_follows_options_but_not_where_the_start_came_from():
         replace(plain, bounces="all"),
         replace(plain, size=(64, 48)),
         replace(plain, start=config_text(TunedConfig(visibility="transmittance"))),
-        replace(plain, start=config_text(TunedConfig(ArtistParameters(lloyd_iterations=2)))),
+        replace(plain, start=config_text(TunedConfig(ArtistParameters(lloyd_iterations=0)))),
         replace(plain, start=config_text(TunedConfig(quality=Quality(interleave=4)))),
         replace(plain, start=config_text(TunedConfig(quality=Quality(map_size=8)))),
         replace(plain, start=config_text(TunedConfig(quality=Quality(map_refinement=1)))),

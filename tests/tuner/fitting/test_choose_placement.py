@@ -6,17 +6,18 @@ from dataclasses import replace
 import pytest
 from built_scenes import colored_room
 from converged_views import converged_view
+from point_vpls import point_vpls
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters, placement
+from vpltune.renderer.config.artist_parameters import LARGEST_DISC_COUNT, ArtistParameters, placement
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.evaluation.validation import between, candidates
-from vpltune.tuner.fitting.choose_placement import choose_placement, placement_name
+from vpltune.tuner.fitting.choose_placement import IMPORTANCES, choose_placement, placement_name
 from vpltune.tuner.fitting.fit_views import robust_errors
 from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
 
-START = ArtistParameters(vpl_count=64)
+START = point_vpls(vpl_count=64)
 CONFIG = TunedConfig(START, quality=Quality(rsm_resolution=128))
 
 
@@ -28,7 +29,8 @@ def test_discs_beat_points_in_a_corner(gl_context):
     truth = [converged_view(runtime, light, CONFIG) for light in ("spot", "point", "wide_spot")]
     views = capture_views(runtime, CONFIG, tuple(v.view for v in truth), tuple(v.reference for v in truth))
     chosen = choose_placement(runtime, views, CONFIG, robust_errors(views))
-    assert set(chosen.costs) == {"points γ=1 η=0", "discs λ=2 γ=1 η=0.5", "discs λ=2 γ=1 η=1"}
+    discs = {f"discs λ=2 γ=1 η={importance:g}" for importance in IMPORTANCES}
+    assert set(chosen.costs) == {"points γ=1 η=0", *discs}
     assert chosen.costs[placement_name(chosen.parameters)] == min(chosen.costs.values()) < 1.0
     assert [view.view for view in chosen.views] == [view.view for view in views]
     assert all(view.drawn_with == CONFIG.with_parameters(chosen.parameters) for view in chosen.views)
@@ -48,6 +50,12 @@ def test_a_start_that_is_best_keeps_its_views(gl_context):
     chosen = choose_placement(runtime, (own,), CONFIG, robust_errors((own,)))
     assert chosen.parameters == START
     assert chosen.views == (own,)
+
+
+def test_a_placement_is_named_after_what_is_drawn():
+    """More VPLs than can be clustered are points, whatever the config asks for."""
+    names = [placement_name(ArtistParameters(vpl_count=LARGEST_DISC_COUNT + more)) for more in (0, 1)]
+    assert names == ["discs λ=2 γ=1 η=0.5", "points γ=1 η=0.5"]
 
 
 def test_candidates_are_the_placement_halfway_and_tuned():

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from built_scenes import colored_room
 from converged_views import MANY, converged_view
+from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
@@ -19,7 +20,7 @@ from vpltune.tuner.fitting.fit_density import (
 from vpltune.tuner.fitting.fit_status import FitStatus
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
-FEW = TunedConfig(ArtistParameters(vpl_count=24), quality=Quality(rsm_resolution=128))
+FEW = TunedConfig(point_vpls(vpl_count=24), quality=Quality(rsm_resolution=128))
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +42,7 @@ def test_few_vpls_are_better_where_they_were_not_fitted_to(room):
 
     tuned = error(fit.parameters)
     assert tuned < 0.33 * error(FEW.parameters)
-    assert tuned < 0.4 * error(ArtistParameters(vpl_count=48, density_exponent=0.0))
+    assert tuned < 0.4 * error(point_vpls(vpl_count=48, density_exponent=0.0))
     assert fit.parameters.vpl_count == FEW.parameters.vpl_count
     assert fit.descent.loss == min(trial.loss for trial in fit.trials)
 
@@ -50,7 +51,7 @@ def test_few_vpls_are_better_where_they_were_not_fitted_to(room):
 def test_the_result_is_never_worse_than_the_start(room):
     """The start's own density is among the trials, whatever it is."""
     runtime, view = room
-    start = ArtistParameters(vpl_count=16, density_exponent=0.8, density_importance=0.3)
+    start = point_vpls(vpl_count=16, density_exponent=0.8, density_importance=0.3)
     fit = fit_density(runtime, (view,), FEW.with_parameters(start), rotations=table_rotations(2, 0))
     own = [t for t in fit.trials if (t.density_exponent, t.density_importance) == (0.8, 0.3)]
     assert len(own) == 1

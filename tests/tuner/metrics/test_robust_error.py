@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from built_scenes import colored_room, room_view
 from own_reference import own_reference
+from point_vpls import point_vpls
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.fitting.fit_placement import fit_placement
@@ -16,7 +16,7 @@ from vpltune.tuner.metrics.relative_squared_error import relative_weight
 from vpltune.tuner.metrics.robust_error import LEAST_SCALE, MASKED_SHARE, RobustError, robust_error
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
-PLANTED = ArtistParameters(intensity=0.8, falloff_footprint=0.7, vpl_count=256)
+PLANTED = point_vpls(intensity=0.8, falloff_footprint=0.7, vpl_count=256)
 
 
 def counted(scale: float) -> RobustError:
@@ -86,7 +86,7 @@ def test_pixels_that_no_parameter_can_mend_do_not_rule_a_fit(gl_context):
     spoilt = reference.irradiance_a.copy()
     spoilt[np.random.default_rng(2).random(spoilt.shape[:2]) < 0.02] = 0.0
     reference = replace(reference, irradiance_a=spoilt, irradiance_b=spoilt)
-    start = ArtistParameters(vpl_count=256)
+    start = point_vpls(vpl_count=256)
     drawn = CapturedView(view, reference, runtime.capture(view, planted.with_parameters(start)))
     truth = captured.indirect_irradiance.mean(dtype=np.float64)
     fits = (fit_placement((drawn,), start, errors) for errors in (None, robust_errors((drawn,))))

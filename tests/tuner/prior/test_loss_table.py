@@ -40,7 +40,7 @@ PARAMETERS = ArtistParameters(vpl_count=32)
 def view(gl_context) -> CapturedView:
     """A room whose reference is the runtime's own image with other parameters, with noise in both halves."""
     gl_context.__enter__()
-    truth = replace(PARAMETERS, intensity=1.4, falloff_footprint=1.0)
+    truth = replace(PARAMETERS, intensity=1.4, falloff_footprint=1.5)
     config = TunedConfig(truth, visibility="maps", quality=Quality(rsm_resolution=128))
     drawn = Runtime(colored_room(), context=gl_context).capture(room_view(), config)
     noise = np.random.default_rng(0).normal(1.0, 0.05, (2, *drawn.indirect_irradiance.shape))
@@ -98,7 +98,7 @@ def test_near_between_them(view, table, seed):
 
 def test_gradient(table):
     """The gradient matches central differences, away from the nodes, where the linear pieces have kinks."""
-    point = jnp.array([0.52, 0.37, 0.07, 0.6], jnp.float32)
+    point = jnp.array([0.52, 0.47, 0.07, 0.6], jnp.float32)
     gradient = jax.grad(lambda p: table_loss(table, p))(point)
     for axis in range(4):
         step = jnp.zeros(4).at[axis].set(2e-3)

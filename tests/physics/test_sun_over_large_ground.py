@@ -54,7 +54,7 @@ def test_faces_share_out_the_flux(gl_context, monkeypatch, width):
 
 @pytest.mark.parametrize("factor", [0.01, 100.0])
 def test_scale_changes_nothing(gl_context, factor):
-    """To 5e-3 relative RMSE: of 256² texels, a few on the edges of the sun's patch are rounded to its other side."""
+    """To 5e-3 relative RMSE: of 256² texels, a few at the edges of the sunlit floor are rounded."""
     scene = room_on_ground(2e3)
     view = room_view(scene, (32, 24))
     image = Runtime(scene, context=gl_context).render(view, COARSE, layer="irradiance")

@@ -91,7 +91,7 @@ void main() {
     if (!missing && any(greaterThan(vpl.flux.rgb, vec3(0.0)))) {
         mat3 frame = hemisphere_frame(vpl.normal_area.xyz);
         mat3 axes = mat3(frame[0] + frame[1], frame[0] - frame[1], frame[2]);
-        vec3 origin = visibility_origin(vpl, scene_length);
+        vec3 origin = visibility_origin(vpl);
         for (uint i = lane; i < receiver_bounds_count; i += 64u) {
             mark(receiver_bounds[i], origin, axes);
         }

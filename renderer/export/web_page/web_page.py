@@ -47,8 +47,8 @@ _SHADERS = (
     "web/vpl_importance_mean.frag",
 )
 _DISC_SHADERS = ("web/clustered_discs_owners.frag", "web/clustered_discs.frag", "web/vpl_gather_discs.frag")
-_MAP_SHADERS = ("web/vpl_visibility_maps.frag",)
-_DETAIL_SHADERS = ("web/vpl_visibility_edges.frag", "web/vpl_visibility_details.frag")
+_MAP_SHADERS = ("web/vpl_visibility_maps.frag", "web/vpl_visibility_edges.frag")
+_DETAIL_SHADERS = ("web/vpl_visibility_details.frag",)
 _HEADER = """#version 300 es
 precision highp float;
 precision highp int;

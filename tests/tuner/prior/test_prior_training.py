@@ -25,7 +25,7 @@ COUNTS = (16, 64)  # VPL counts, a choice
 
 def planted_best(statistics: np.ndarray) -> np.ndarray:
     """α follows the third statistic; all other parameters stay at the defaults."""
-    return default_point(ArtistParameters()) + np.array([0.0, 0.5 * (statistics[2] - 0.4), 0.0, 0.0])
+    return default_point(ArtistParameters()) + np.array([0.0, 0.4 * (statistics[2] - 0.4), 0.0, 0.0])
 
 
 def planted_scene(number: int) -> PriorScene:

@@ -1,7 +1,7 @@
 // The visibility maps of standalone_reader.py: a small map of the surfaces that each VPL's hemisphere sees.
 // CASTING sends one ray through each texel, against every triangle, which is short but slow. Where the surface in one
-// texel hides that in its neighbour, MARKING replaces the texel by a block of finer ones, and REFINING casts those.
-// LIGHTING looks up the map in the direction of a pixel. The program defines the config's parameters, scene_length,
+// texel hides that in its neighbour, MARKING replaces the texel by a block of finer ones, and REFINING casts those. Where
+// two texels meet in a concave corner, MARKING says so in the last bits of the distance. LIGHTING looks up the map in the direction of a pixel. The program defines the config's parameters, scene_length,
 // map_size (texels along the side, or 0), map_refinement (texels along the side of a block) and map_blocks, the room
 // for blocks.
 
@@ -36,6 +36,11 @@ vec3 map_axis(ivec2 texel, int size) {
 // surface behind the plane of the hit.
 float overlap(vec3 end, vec3 plane, vec3 hidden, vec3 hidden_normal) {
     return min(dot(end - hidden, hidden_normal), dot(end - hidden, plane)) / length(hidden);
+}
+
+// Whether a hit lies behind the plane of another one, by more than rounding.
+bool is_behind(vec3 end, vec3 other, vec3 plane) {
+    return dot(end - other, plane) < -1e-4 * (length(end) + length(other));
 }
 #endif
 
@@ -96,7 +101,7 @@ void main() {
 #ifdef MARKING
 layout(local_size_x = 64) in;
 layout(std430, binding = 6) buffer Counted { uint counted; };
-shared bool is_edge[map_texels];
+shared uint marks[map_texels];  // of corners; 8 more at a silhouette
 
 bool hides(ivec2 texel, ivec2 other, int start, mat3 frame) {
     vec4 nearer = maps[start + texel.y * map_size + texel.x], farther = maps[start + other.y * map_size + other.x];
@@ -104,46 +109,112 @@ bool hides(ivec2 texel, ivec2 other, int start, mat3 frame) {
     return farther.w < 1e5 * scene_length && overlap(end, nearer.xyz, hidden, farther.xyz) > 2e-3;
 }
 
+bool is_corner(ivec2 texel, ivec2 other, int start, mat3 frame) {
+    if (any(notEqual(clamp(other, 0, map_size - 1), other))) { return false; }
+    vec4 own = maps[start + texel.y * map_size + texel.x], met = maps[start + other.y * map_size + other.x];
+    vec3 end = frame * map_axis(texel, map_size) * own.w, beside = frame * map_axis(other, map_size) * met.w;
+    return max(own.w, met.w) < 1e5 * scene_length && dot(own.xyz, met.xyz) < 0.99
+        && !is_behind(end, beside, met.xyz) && !is_behind(beside, end, own.xyz);
+}
+
+// 1 beside a corner; 2 … 5 beside a vertex of three planes, and which of the texel's own corners is towards it.
+uint corner_mark(ivec2 texel, int start, mat3 frame) {
+    uint mark = 0u;
+    for (int k = 0; k < 4; ++k) {
+        ivec2 to = ivec2(2 * (k & 1) - 1, (k & 2) - 1), last = texel;
+        for (int i = 1; i < 4; ++i) {
+            ivec2 beside = texel + ivec2((i & 1) * to.x, (i >> 1) * to.y);
+            if (!is_corner(texel, beside, start, frame)) { continue; }
+            mark = last != texel && is_corner(last, beside, start, frame) ? uint(2 + k) : max(mark, 1u);
+            last = beside;
+        }
+    }
+    return mark;
+}
+
 void main() {
     int vpl = 3 * int(gl_WorkGroupID.x), start = vpl / 3 * map_texels, lane = int(gl_LocalInvocationID.x);
     mat3 frame = map_frame(vpls[vpl + 1].xyz);
     for (int i = lane; i < map_texels; i += 64) {
         ivec2 texel = ivec2(i % map_size, i / map_size);
-        is_edge[i] = false;
+        marks[i] = corner_mark(texel, start, frame);
         for (int k = 0; k < 9; ++k) {
             ivec2 beside = clamp(texel + ivec2(k % 3, k / 3) - 1, ivec2(0), ivec2(map_size - 1));
-            is_edge[i] = is_edge[i] || hides(texel, beside, start, frame) || hides(beside, texel, start, frame);
+            if (hides(texel, beside, start, frame) || hides(beside, texel, start, frame)) { marks[i] |= 8u; }
         }
     }
     barrier();
     for (int i = lane; i < map_texels; i += 64) {
-        uint block = is_edge[i] ? atomicAdd(counted, 1u) : uint(map_blocks);
-        if (block < uint(map_blocks)) { maps[start + i].w = -1.0 - float(block); }
+        uint block = marks[i] >= 8u ? atomicAdd(counted, 1u) : uint(map_blocks);
+        float marked = uintBitsToFloat((floatBitsToUint(maps[start + i].w) & ~7u) | (marks[i] & 7u));
+        maps[start + i].w = block < uint(map_blocks) ? -1.0 - float(block) : marked;
     }
 }
 #endif
 
 #ifdef LIGHTING
+// A texel of a map: its hit from the map's origin, the hit's plane, the texel's side in finest texels, its corner mark.
+struct Texel { vec3 end, plane; int side; uint mark; };
+
+// The texel at a place, which counts finest texels.
+Texel texel_at(int vpl, ivec2 place, mat3 frame) {
+    ivec2 texel = place / map_refinement, inside = place % map_refinement;
+    vec4 met = maps[(vpl / 3 * map_size + texel.y) * map_size + texel.x];
+    if (met.w >= 0.0) {
+        vec3 end = frame * map_axis(texel, map_size) * met.w;
+        return Texel(end, met.xyz, map_refinement, floatBitsToUint(met.w) & 7u);
+    }
+    met = maps[block_start(-1.0 - met.w) + inside.y * map_refinement + inside.x];
+    return Texel(frame * map_axis(place, map_size * map_refinement) * met.w, met.xyz, 1, 1u);
+}
+
+// The overlap of a pixel whose tangent plane hides the middle of a disc: both the pixel and the place where that plane
+// cuts the disc are behind the surface.
+float rim_overlap(Texel met, vec3 offset, vec3 normal, vec3 axis) {
+    vec3 flat_normal = normal - axis * dot(normal, axis);
+    vec3 cut = flat_normal * (dot(offset, normal) / max(dot(flat_normal, flat_normal), 1e-12));
+    return min(dot(met.end - offset, met.plane), dot(met.end - cut, met.plane)) / length(offset);
+}
+
+// The overlap of a pixel and a plane that a corner extends to the pixel's direction.
+float corner_overlap(Texel met, vec3 offset, vec3 normal, vec3 axis) {
+    if (dot(offset, normal) >= 0.0) { return rim_overlap(met, offset, normal, axis); }
+    bool before = dot(met.end - offset, normal) > 1e-4 * length(offset);
+    return before ? dot(met.end - offset, met.plane) / length(offset) : -1.0;
+}
+
 // Share of a VPL's light that reaches a pixel. The hit of the nearest ray shades it if each is behind the other's
-// plane.
+// plane. At a corner, so do the planes of the three rays around it that no hit of the four is behind.
 float visibility(int vpl, vec3 position, vec3 normal) {
     if (map_size == 0) { return 1.0; }
     mat3 frame = map_frame(vpls[vpl + 1].xyz);
     vec3 offset = position - map_origin(vpl);
     vec3 towards = offset * frame;
-    if (towards.z <= 0.0 || dot(offset, normal) >= 0.0) { return 1.0; }
+    if (towards.z <= 0.0) { return 1.0; }
+    int finest = map_size * map_refinement;
     vec2 p = towards.xy / (abs(towards.x) + abs(towards.y) + towards.z);
-    vec2 place = (vec2(p.x + p.y, p.x - p.y) * 0.5 + 0.5) * float(map_size);
-    ivec2 texel = min(ivec2(place), map_size - 1);
-    int size = map_size;
-    vec4 met = maps[(vpl / 3 * map_size + texel.y) * map_size + texel.x];
-    if (met.w < 0.0) {
-        ivec2 inside = min(ivec2((place - vec2(texel)) * float(map_refinement)), map_refinement - 1);
-        met = maps[block_start(-1.0 - met.w) + inside.y * map_refinement + inside.x];
-        texel = texel * map_refinement + inside;
-        size *= map_refinement;
+    vec2 place = min((vec2(p.x + p.y, p.x - p.y) * 0.5 + 0.5) * float(finest), float(finest) - 0.5);
+    ivec2 inside = ivec2(place);
+    Texel own = texel_at(vpl, inside, frame);
+    float hidden = dot(offset, normal) < 0.0
+        ? overlap(own.end, own.plane, offset, normal) : rim_overlap(own, offset, normal, frame[2]);
+    if (own.mark > 0u) {
+        ivec2 start = inside / own.side * own.side;
+        uint vertex = own.mark - 2u;
+        bvec2 beyond = own.mark == 1u ? greaterThanEqual(2.0 * place, vec2(2 * start + own.side))
+            : bvec2((vertex & 1u) != 0u, (vertex & 2u) != 0u);
+        ivec2 beside = start + ivec2(beyond.x ? own.side : -1, beyond.y ? own.side : -1);
+        Texel met[4] = Texel[4](own, own, own, own);
+        for (int i = 1; i < 4; ++i) {
+            ivec2 around = ivec2((i & 1) != 0 ? beside.x : inside.x, (i & 2) != 0 ? beside.y : inside.y);
+            if (clamp(around, 0, finest - 1) == around) { met[i] = texel_at(vpl, around, frame); }
+        }
+        for (int i = 0; i < 4; ++i) {
+            bool counts = !is_behind(met[i].end, own.end, own.plane);
+            for (int j = 0; j < 4; ++j) { counts = counts && !is_behind(met[j].end, met[i].end, met[i].plane); }
+            if (counts) { hidden = max(hidden, corner_overlap(met[i], offset, normal, frame[2])); }
+        }
     }
-    float hidden = overlap(frame * map_axis(texel, size) * met.w, met.xyz, offset, normal);
     return 1.0 - clamp((hidden - visibility_bias) / visibility_softness, 0.0, 1.0);
 }
 #endif

@@ -292,7 +292,8 @@ def cast_map(vpl: dict) -> dict[str, np.ndarray]:
     """The map of one VPL of the boxes: ends [L] and normals in its frame, and finer blocks at silhouettes."""
     size, refinement = MAP_SIZE, MAP_REFINEMENT
     end, normal = _cast(vpl, size)
-    silhouette = visibility_maps.is_silhouette(end, normal, visibility_maps.FARTHEST * diagonal() / LENGTH)
+    farthest = visibility_maps.FARTHEST * diagonal() / LENGTH
+    silhouette = visibility_maps.is_silhouette(end, normal, farthest)
     block = np.full((size, size), -1)
     block[silhouette] = np.arange(silhouette.sum())
     fine_end, fine_normal = _cast(vpl, size * refinement)
@@ -303,6 +304,7 @@ def cast_map(vpl: dict) -> dict[str, np.ndarray]:
     return {
         "end": end,
         "normal": normal,
+        "corner": np.where(silhouette, 1, visibility_maps.corner_marks(end, normal, farthest)),
         "block": block,
         "block_end": blocks(fine_end),
         "block_normal": blocks(fine_normal),

@@ -150,7 +150,7 @@ def splatted_texels(view: CapturedView, points: SurfacePoints, random: np.random
         normals.append(np.concatenate([normal, [[0.0, 0.0, -1.0]]])[nearest])
     shape = (len(origins), SIZE, SIZE)
     end, normal = (jnp.asarray(np.reshape(part, (-1, 3)), jnp.float32) for part in (ends, normals))
-    return MapTexels(end, normal, jnp.full(shape, -1, jnp.int32), 1)
+    return MapTexels(end, normal, jnp.zeros(shape, jnp.int32), jnp.full(shape, -1, jnp.int32), 1)
 
 
 def _splatted(offset: Float64[np.ndarray, "points 3"], width: float) -> Int64[np.ndarray, "size size"]:

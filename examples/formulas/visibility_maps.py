@@ -11,6 +11,9 @@ LIFT = 0.01
 NOTHING = 2.0
 FARTHEST = 1.5
 LEAST_OVERLAP = 2e-3
+ROUNDING = 1e-4
+CORNER_COSINE = 0.99
+VERTICES = ((-1, -1), (1, -1), (-1, 1), (1, 1))
 
 
 def hemisphere_frame(normal: np.ndarray) -> np.ndarray:
@@ -44,17 +47,63 @@ def texel_axis(column, row, size: int) -> np.ndarray:
     return hemi_octahedral_decode((np.stack([column, row], axis=-1) + 0.5) * (2.0 / size) - 1.0)
 
 
-def looked_up(direction: np.ndarray, size: int) -> tuple[int, int, np.ndarray]:
-    """Column, row, and the place in that texel in [0, 1]², of the texel that a direction falls in."""
-    place = (hemi_octahedral_encode(direction) * 0.5 + 0.5) * size
-    texel = np.minimum(place.astype(int), size - 1)
-    return int(texel[0]), int(texel[1]), place - texel
+def place_on_map(direction: np.ndarray, size: int) -> np.ndarray:
+    """Column and row of a direction, in texels of a map with `size` of them along its side."""
+    return np.minimum((hemi_octahedral_encode(direction) * 0.5 + 0.5) * size, size - 0.5)
 
 
 def overlap(end, end_normal, receiver, receiver_normal) -> np.ndarray:
     """By how much of its distance a receiver is overlapped by the surface that a ray met at `end`."""
     between = end - receiver
     return np.minimum(dot(between, receiver_normal), dot(between, end_normal)) / length(receiver)
+
+
+def rim_overlap(end, end_normal, receiver, receiver_normal) -> float:
+    """`overlap` for a receiver whose tangent plane hides the middle of a disc."""
+    flat = receiver_normal * [1.0, 1.0, 0.0]
+    cut = flat * (dot(receiver, receiver_normal) / max(dot(flat, flat), 1e-12))
+    return np.minimum(dot(end - receiver, end_normal), dot(end - cut, end_normal)) / length(receiver)
+
+
+def corner_overlap(end, end_normal, receiver, receiver_normal) -> float:
+    """`overlap` with a plane that a corner extends to the receiver's direction."""
+    if not dot(receiver, receiver_normal) < 0.0:
+        return rim_overlap(end, end_normal, receiver, receiver_normal)
+    if not dot(end - receiver, receiver_normal) > ROUNDING * length(receiver):
+        return -1.0
+    return dot(end - receiver, end_normal) / length(receiver)
+
+
+def is_behind(end, other, other_normal) -> bool:
+    """Whether a hit lies behind the plane of another one, by more than rounding."""
+    return dot(end - other, other_normal) < -ROUNDING * (length(end) + length(other))
+
+
+def corner_marks(end: np.ndarray, normal: np.ndarray, farthest: float) -> np.ndarray:
+    """[row, column]: 0 for no corner, 1 for one, 2 … 5 where a vertex of three planes is near.
+
+    Arguments as for `is_silhouette`.
+    """
+    size = len(end)
+    marks = np.zeros((size, size), int)
+
+    def is_corner(a: tuple[int, int], b: tuple[int, int]) -> bool:
+        behind = is_behind(end[a], end[b], normal[b]) or is_behind(end[b], end[a], normal[a])
+        return dot(normal[a], normal[b]) < CORNER_COSINE and not behind
+
+    for own in np.ndindex(size, size):
+        for vertex, (x, y) in enumerate(VERTICES):
+            row, column = own
+            found = []
+            for beside in ((row, column + x), (row + y, column), (row + y, column + x)):
+                if min(beside) < 0 or max(beside) >= size or length(end[own]) >= farthest:
+                    continue
+                if length(end[beside]) < farthest and is_corner(own, beside):
+                    if found and is_corner(found[-1], beside):
+                        marks[own] = 2 + vertex
+                    found.append(beside)
+                    marks[own] = max(marks[own], 1)
+    return marks
 
 
 def seen_share(overlapping, bias: float, softness: float) -> np.ndarray:
@@ -91,24 +140,52 @@ def vpl_visibility(position, normal, vpl: dict, maps: dict, scene_length: float,
     Args:
         position, normal: of the receiver, in the world.
         vpl: `position`, `normal`, `footprint`.
-        maps: `end`, `normal` [size, size, 3]; `block` [size, size], −1 or the number of a finer block;
-            `block_end`, `block_normal` [blocks, refinement, refinement, 3].
+        maps: `end`, `normal` [size, size, 3]; `corner` [size, size], from `corner_marks`; `block` [size,
+            size], −1 or the number of a finer block; `block_end`, `block_normal` [blocks, refinement,
+            refinement, 3].
     """
     frame = hemisphere_frame(vpl["normal"])
     origin = map_origin(vpl["position"], vpl["normal"], vpl["footprint"])
     receiver = frame @ (position - origin) / scene_length
     receiver_normal = frame @ normal
-    if not receiver[2] > 0.0 or not dot(receiver, receiver_normal) < 0.0:
+    if not receiver[2] > 0.0:
         return 1.0
-    column, row, inside = looked_up(receiver, len(maps["end"]))
-    block = maps["block"][row, column]
+    refinement = maps["block_end"].shape[1]
+    finest = len(maps["end"]) * refinement
+    place = place_on_map(receiver, finest)
+    column, row = place.astype(int)
+    coarse = (row // refinement, column // refinement)
+    own = met_at(maps, column, row)
+    facing = dot(receiver, receiver_normal) < 0.0
+    hidden = (overlap if facing else rim_overlap)(*own, receiver, receiver_normal)
+    is_block = maps["block"][coarse] >= 0
+    mark = 1 if is_block else maps["corner"][coarse]
+    if mark > 0:
+        around = texels_around(place, 1 if is_block else refinement, mark)
+        met = [own] + [
+            met_at(maps, x, y) if min(x, y) >= 0 and max(x, y) < finest else own for x, y in around
+        ]
+        for each in met:
+            if not is_behind(each[0], *own) and not any(is_behind(other[0], *each) for other in met):
+                hidden = max(hidden, corner_overlap(*each, receiver, receiver_normal))
+    return float(seen_share(hidden, bias, softness))
+
+
+def met_at(maps: dict, column: int, row: int) -> tuple[np.ndarray, np.ndarray]:
+    """End and normal of the texel at a place, which counts finest texels."""
+    refinement = maps["block_end"].shape[1]
+    coarse = (row // refinement, column // refinement)
+    block = maps["block"][coarse]
     if block < 0:
-        end, end_normal = maps["end"][row, column], maps["normal"][row, column]
-    else:
-        refinement = maps["block_end"].shape[1]
-        fine = np.minimum((inside * refinement).astype(int), refinement - 1)
-        end, end_normal = (
-            maps["block_end"][block, fine[1], fine[0]],
-            maps["block_normal"][block, fine[1], fine[0]],
-        )
-    return float(seen_share(overlap(end, end_normal, receiver, receiver_normal), bias, softness))
+        return maps["end"][coarse], maps["normal"][coarse]
+    fine = (block, row % refinement, column % refinement)
+    return maps["block_end"][fine], maps["block_normal"][fine]
+
+
+def texels_around(place: np.ndarray, side: int, mark: int) -> list[tuple[int, int]]:
+    """Column and row of a place in each of the three texels around the one at `place`, `side` wide."""
+    start = place.astype(int) // side * side
+    beyond = np.array(VERTICES[mark - 2]) > 0 if mark >= 2 else 2.0 * place >= 2 * start + side
+    column, row = (int(c) for c in np.where(beyond, start + side, start - 1))
+    own_column, own_row = place.astype(int)
+    return [(column, own_row), (own_column, row), (column, row)]

@@ -25,7 +25,7 @@ from vpltune.renderer.frame.visibility_map_layout import VisibilityMapLayout
 from vpltune.renderer.gpu.camera_uniforms import camera_uniforms
 from vpltune.renderer.gpu.render_targets import MAX_ATLAS_COLUMNS
 from vpltune.renderer.scene.animation import AnimationPlayer
-from vpltune.renderer.scene.light_faces import LightRecords, light_records
+from vpltune.renderer.scene.light_faces import LightRecords, face_count, light_records
 from vpltune.renderer.scene.placed_boxes import placed_boxes
 from vpltune.renderer.scene.scene import Scene, Texture, transform_normals, transform_points
 from vpltune.renderer.scene.sun_faces import SunGrid, nested_face_count
@@ -102,7 +102,7 @@ def scene_bundle(scene: Scene, view: View, config: TunedConfig) -> SceneBundle:
 def _vpl_importance(config: TunedConfig, view: View) -> dict[str, Any]:
     used = config.parameters.density_importance > 0.0
     return {
-        "cells": vpl_importance.importance_cells(view.lights) if used else 0,
+        "cells": vpl_importance.importance_cells(face_count(view.lights, nested_faces=0)) if used else 0,
         "receivers": vpl_importance.RECEIVERS,
         "spread": vpl_importance.SPREAD,
         "dark_share": vpl_importance.DARK_SHARE,

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, Int32, UInt32
 
 from vpltune.renderer.frame.frame import Frame
-from vpltune.renderer.frame.visibility_map_layout import TEXEL_BYTES
+from vpltune.renderer.frame.visibility_map_layout import TEXEL_BYTES, VISIBILITY_CORNER_BITS
 from vpltune.renderer.gpu.resources import HOST_TEXTURE, Access, Resources
 from vpltune.renderer.scene.views import View, ray_directions_world
 
@@ -22,6 +22,8 @@ class VisibilityMaps:
 
     texels: UInt32[np.ndarray, "vpls size size 2"]
     """Zero where there is a block."""
+    corner: Int32[np.ndarray, "vpls size size"]
+    """The corner mark of each texel, 0 for none: shaders/common/vpl_visibility.glsl."""
     block: Int32[np.ndarray, "vpls size size"]
     """Which block of finer texels stands for this one, counted in the order of texels; -1 where none does."""
     details: UInt32[np.ndarray, "blocks refinement refinement 2"]
@@ -133,10 +135,11 @@ def _visibility_maps(frame: Frame) -> VisibilityMaps | None:
     details = details.reshape(-1, layout.refinement, layout.refinement, 2)
     # Blocks lie in the order in which the GPU came to them, which is another one each time.
     details = details[texels[refined][:, 1]]
+    corner = (texels[..., 0] & np.uint32(VISIBILITY_CORNER_BITS)).astype(np.int32)
     texels = np.where(refined[..., None], np.uint32(0), texels)
     block = np.full(refined.shape, -1, np.int32)
     block[refined] = np.arange(len(details), dtype=np.int32)
-    return VisibilityMaps(texels, block, details)
+    return VisibilityMaps(texels, corner, block, details)
 
 
 def _met_surfaces(

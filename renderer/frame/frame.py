@@ -81,7 +81,7 @@ class FrameSetup:
             size=view.size,
             face_count=face_count(view.lights, nested_faces),
             rsm_resolution=rsm_resolution(view.lights, config.quality),
-            importance_cells=importance_cells(view.lights),
+            importance_cells=importance_cells(face_count(view.lights, nested_faces=0)),
             vpl_count=count,
             interleave=config.quality.interleave_for(count, view.size),
             maps=VisibilityMapLayout.of(config),

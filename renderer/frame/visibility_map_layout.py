@@ -10,6 +10,18 @@ VISIBILITY_LIFT = 0.01
 """Rays start, and distances count, from a point lifted off the VPL's surface by this many footprints. A VPL
 behind its own surface would see nothing else, and the RSM is off: by 1/256 of a texel, in which a rasteriser
 counts places, and by the rounding of its depth. A footprint is tens of texels."""
+VISIBILITY_CORNER_BITS = 7
+"""Bits at the end of a map's distances that hold the corner mark (shaders/common/vpl_visibility.glsl). They
+change a distance by 1e-6 of itself."""
+VISIBILITY_NEAREST_VERTEX = 1
+"""The mark of a texel that a concave corner of two surfaces may run through: a receiver's three neighbouring
+texels are those nearest to its direction."""
+VISIBILITY_FIRST_VERTEX = 2
+"""The first of four marks of a texel near a vertex of three surfaces: its neighbours are those across the
+texel's corner number mark - 2, the same for every receiver."""
+VISIBILITY_ROUNDING = 1e-4
+"""Rounding of positions and of 16-bit normals moves a point by less than this share of the distance. A
+choice."""
 FRAME_TURNS_OVER = -0.5
 """The z of a normal below which a map's tangents turn over. Not 0, where walls have their normals and
 rounding would decide."""
@@ -39,12 +51,16 @@ class VisibilityMapLayout:
         return cls(config.quality.map_size, config.quality.map_refinement)
 
     @property
-    def defines(self) -> dict[str, int | float]:
+    def defines(self) -> dict[str, int | float | str]:
         """What a shader that includes `common/vpl_visibility.glsl` is compiled with."""
         return {
             "VISIBILITY_MAP_SIZE": self.size,
             "VISIBILITY_MAP_REFINEMENT": self.refinement,
             "VISIBILITY_LIFT": VISIBILITY_LIFT,
+            "VISIBILITY_CORNER_BITS": f"{VISIBILITY_CORNER_BITS}u",
+            "VISIBILITY_NEAREST_VERTEX": f"{VISIBILITY_NEAREST_VERTEX}u",
+            "VISIBILITY_FIRST_VERTEX": f"{VISIBILITY_FIRST_VERTEX}u",
+            "VISIBILITY_ROUNDING": VISIBILITY_ROUNDING,
             "FRAME_TURNS_OVER": FRAME_TURNS_OVER,
         }
 

@@ -1,8 +1,8 @@
 // Visibility of a VPL from its visibility map: a small hemispherical map of the surfaces that the VPL sees.
 //
 // Provides: reading and writing of a map's entries, and `vpl_visibility`. Needs common/virtual_point_lights.glsl.
-// Constants: VISIBILITY_MAP_SIZE, VISIBILITY_MAP_REFINEMENT and VISIBILITY_LIFT [footprints] of
-// renderer/frame/visibility_map_layout.py.
+// Constants: VISIBILITY_MAP_SIZE, VISIBILITY_MAP_REFINEMENT, VISIBILITY_LIFT [footprints], VISIBILITY_ROUNDING [share of
+// the distance] and those of the corner mark, of renderer/frame/visibility_map_layout.py.
 // Twin: tuner/surrogate/vpl_visibility.py. Imperfect shadow maps (Ritschel et al. 2008) hold the same, but as depths.
 #include "common/hemi_octahedral.glsl"
 #include "common/octahedral.glsl"
@@ -10,7 +10,12 @@
 // visibility_maps [vpls, size, size] holds one entry for each ray: the distance to the surface that it hit [L], as the
 // bits of a float, and that surface's normal on the VPL's side, in the VPL's frame, octahedral in 2 × 16 bits. If the
 // sign bit of the first word is set, a silhouette runs through the texel. Then the second word is the index of a block
-// in visibility_details [blocks, refinement, refinement], which holds entries of the same form for finer rays.
+// in visibility_details [blocks, refinement, refinement], which holds entries of the same form for finer rays. The
+// lowest bits of the first word are the texel's corner mark, 0 for none. A concave corner of two surfaces may run through
+// a marked texel, so a receiver must not lie behind the surface of a neighbouring texel either. The neighbours are three,
+// across a side, another side and the vertex between them. With VISIBILITY_NEAREST_VERTEX, they are those nearest to the
+// receiver's direction; else those across the vertex number mark − VISIBILITY_FIRST_VERTEX, which lies beyond the texel
+// in x if bit 0 is set, in y if bit 1 is set.
 #ifndef VISIBILITY_MAP_ENTRY  // WebGL has no storage buffers: web/visibility_atlas.glsl defines its own
 layout(std430, binding = VISIBILITY_MAPS_BINDING) buffer VisibilityMaps {
     uvec2 visibility_maps[];
@@ -52,14 +57,15 @@ vec3 visibility_axis(ivec2 texel, int size) {
     return hemi_octahedral_decode((vec2(texel) + 0.5) * (2.0 / float(size)) - 1.0);
 }
 
-// The entry for a ray's hit.
+// The entry for a ray's hit, without a corner mark.
 uvec2 visibility_texel(float distance_in_l, vec3 normal_vpl) {
-    return uvec2(floatBitsToUint(distance_in_l), packUnorm2x16(octahedral_encode(normal_vpl)));
+    return uvec2(
+        floatBitsToUint(distance_in_l) & ~VISIBILITY_CORNER_BITS, packUnorm2x16(octahedral_encode(normal_vpl)));
 }
 
-// The entry that points to a block of finer rays.
+// The entry that points to a block of finer rays. Any corner in it is looked for.
 uvec2 visibility_block(uint block) {
-    return uvec2(VISIBILITY_BLOCK_BIT, block);
+    return uvec2(VISIBILITY_BLOCK_BIT | VISIBILITY_NEAREST_VERTEX, block);
 }
 
 // The hit that an entry holds; `size` is the number of texels along the side of the entry's map.
@@ -68,22 +74,29 @@ MetSurface met_surface(uvec2 entry, ivec2 texel, int size) {
         visibility_axis(texel, size) * uintBitsToFloat(entry.x), octahedral_decode(unpackUnorm2x16(entry.y)));
 }
 
-// The hit of the ray nearest to a direction of any length, in the VPL's frame. `map_start` is the map's first entry.
-MetSurface seen_surface(vec3 direction, int map_start) {
-    vec2 place = (hemi_octahedral_encode(direction) * 0.5 + 0.5) * float(VISIBILITY_MAP_SIZE);
-    ivec2 texel = min(ivec2(place), ivec2(VISIBILITY_MAP_SIZE - 1));
+// The finest texels along the side of a map: places on it are counted in them.
+const int VISIBILITY_FINEST = VISIBILITY_MAP_SIZE * VISIBILITY_MAP_REFINEMENT;
+
+// What a map holds at a place.
+struct MapTexel {
+    MetSurface met;
+    int side;     // of the texel, in finest texels
+    uint corner;  // its mark
+};
+
+// The texel at a place. `map_start` is the map's first entry.
+MapTexel map_texel(ivec2 place, int map_start) {
+    const int refinement = VISIBILITY_MAP_REFINEMENT;
+    ivec2 texel = place / refinement;
     uvec2 entry = VISIBILITY_MAP_ENTRY(map_start + texel.y * VISIBILITY_MAP_SIZE + texel.x);
-    int size = VISIBILITY_MAP_SIZE;
+    uint corner = entry.x & VISIBILITY_CORNER_BITS;
 #if VISIBILITY_MAP_REFINEMENT > 1
     if ((entry.x & VISIBILITY_BLOCK_BIT) != 0u) {
-        const int refinement = VISIBILITY_MAP_REFINEMENT;
-        ivec2 inside = min(ivec2((place - vec2(texel)) * float(refinement)), ivec2(refinement - 1));
-        entry = VISIBILITY_DETAIL_ENTRY(entry.y, inside);
-        texel = texel * refinement + inside;
-        size *= refinement;
+        entry = VISIBILITY_DETAIL_ENTRY(entry.y, (place % refinement));
+        return MapTexel(met_surface(entry, place, VISIBILITY_MAP_SIZE * refinement), 1, corner);
     }
 #endif
-    return met_surface(entry, texel, size);
+    return MapTexel(met_surface(entry, texel, VISIBILITY_MAP_SIZE), refinement, corner);
 }
 
 // The overlap of a surface and a receiver, as a share of the receiver's distance. It is the lesser of two heights: of
@@ -96,8 +109,64 @@ float surface_overlap(MetSurface met, vec3 receiver, vec3 receiver_normal) {
     return min(dot(between, receiver_normal), dot(between, met.normal)) * inversesqrt(dot(receiver, receiver));
 }
 
-// Share of a VPL's light that reaches a receiver, in [0, 1], from one lookup. Texels are not interpolated: many VPLs
-// average out, and a finer map is better than four lookups at the same cost.
+// The same for a receiver whose tangent plane hides the middle of a disc. The disc's part in sight begins where that
+// plane cuts the disc's, and it is beyond the surface if that place is behind the surface too.
+float rim_overlap(MetSurface met, vec3 receiver, vec3 receiver_normal) {
+    float squared = max(dot(receiver_normal.xy, receiver_normal.xy), 1e-12);
+    vec3 cut = vec3(receiver_normal.xy * (dot(receiver, receiver_normal) / squared), 0.0);
+    return min(dot(met.end - receiver, met.normal), dot(met.end - cut, met.normal))
+        * inversesqrt(dot(receiver, receiver));
+}
+
+// Whether a hit lies behind the plane of another one, by more than rounding.
+bool is_behind(MetSurface met, MetSurface other) {
+    return dot(met.end - other.end, other.normal) < -VISIBILITY_ROUNDING * (length(met.end) + length(other.end));
+}
+
+// The overlap of a receiver with a surface that reaches as far as the receiver's direction, because a corner does: the
+// height of the receiver behind the surface's plane, if the hit is in front of the receiver's tangent plane at all.
+float corner_overlap(MetSurface met, vec3 receiver, vec3 receiver_normal) {
+    if (!(dot(receiver, receiver_normal) < 0.0)) {
+        return rim_overlap(met, receiver, receiver_normal);
+    }
+    vec3 between = met.end - receiver;
+    float share = inversesqrt(dot(receiver, receiver));
+    return dot(between, receiver_normal) * share > VISIBILITY_ROUNDING ? dot(between, met.normal) * share : -1.0;
+}
+
+// The overlap of a receiver with the planes of its own texel's hit and of three around it. A plane counts if none of the
+// four hits is behind it, so that it reaches across all of them, and if its hit is not behind the own plane: between two
+// rays on either side of a concave corner, the nearer of the two planes is in sight.
+float joined_overlap(MapTexel own, vec2 place, int map_start, vec3 receiver, vec3 receiver_normal) {
+    ivec2 inside = ivec2(place), start = inside / own.side * own.side;
+    bvec2 beyond = greaterThanEqual(2.0 * place, vec2(2 * start + own.side));
+    if (own.corner >= VISIBILITY_FIRST_VERTEX) {
+        uint vertex = own.corner - VISIBILITY_FIRST_VERTEX;
+        beyond = bvec2((vertex & 1u) != 0u, (vertex & 2u) != 0u);
+    }
+    ivec2 beside = ivec2(beyond.x ? start.x + own.side : start.x - 1, beyond.y ? start.y + own.side : start.y - 1);
+    MetSurface met[4];
+    met[0] = own.met;
+    for (int i = 1; i < 4; ++i) {
+        ivec2 around = ivec2((i & 1) != 0 ? beside.x : inside.x, (i & 2) != 0 ? beside.y : inside.y);
+        bool on_map = all(greaterThanEqual(around, ivec2(0))) && all(lessThan(around, ivec2(VISIBILITY_FINEST)));
+        met[i] = on_map ? map_texel(around, map_start).met : own.met;
+    }
+    float overlap = -1.0;
+    for (int i = 0; i < 4; ++i) {
+        bool counts = !is_behind(met[i], own.met);
+        for (int j = 0; j < 4; ++j) {
+            counts = counts && !is_behind(met[j], met[i]);
+        }
+        if (counts) {
+            overlap = max(overlap, corner_overlap(met[i], receiver, receiver_normal));
+        }
+    }
+    return overlap;
+}
+
+// Share of a VPL's light that reaches a receiver, in [0, 1], from one lookup, or four at a concave corner. Texels are not
+// interpolated: many VPLs average out, and a finer map is better than four lookups at the same cost.
 float vpl_visibility(
     vec3 position_world, vec3 normal_world, VirtualPointLight vpl, int map_start, float scene_length,
     VisibilityParameters parameters
@@ -106,10 +175,17 @@ float vpl_visibility(
     mat3 frame = hemisphere_frame(vpl.normal_area.xyz);
     vec3 to_receiver = (position_world - visibility_origin(vpl)) * frame / scene_length;
     vec3 normal = normal_world * frame;
-    // A receiver below the VPL's horizon, or facing away from it, gets no light anyway.
-    if (!(to_receiver.z > 0.0) || !(dot(to_receiver, normal) < 0.0)) {
+    // A receiver below the VPL's horizon gets no light anyway.
+    if (!(to_receiver.z > 0.0)) {
         return 1.0;
     }
-    float overlap = surface_overlap(seen_surface(to_receiver, map_start), to_receiver, normal);
+    vec2 place = (hemi_octahedral_encode(to_receiver) * 0.5 + 0.5) * float(VISIBILITY_FINEST);
+    place = min(place, vec2(float(VISIBILITY_FINEST) - 0.5));
+    MapTexel own = map_texel(ivec2(place), map_start);
+    bool facing = dot(to_receiver, normal) < 0.0;
+    float overlap = facing ? surface_overlap(own.met, to_receiver, normal) : rim_overlap(own.met, to_receiver, normal);
+    if (own.corner != 0u && overlap < parameters.bias + parameters.softness) {
+        overlap = max(overlap, joined_overlap(own, place, map_start, to_receiver, normal));
+    }
     return 1.0 - clamp((overlap - parameters.bias) / parameters.softness, 0.0, 1.0);
 }

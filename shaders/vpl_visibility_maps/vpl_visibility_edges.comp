@@ -1,5 +1,5 @@
-// Visibility maps, part 3: finds the marked texels at silhouettes, lists them, and writes the indices of their blocks
-// into the maps. One workgroup for each VPL.
+// Visibility maps, part 3: marks the texels at concave corners, finds those at silhouettes, lists them, and writes the
+// indices of their blocks into the maps, all for texels that a receiver may look up. One workgroup for each VPL.
 //
 // Reads: `visibility_marks`. Reads and writes: `visibility_maps`. Writes: the list of texels.
 // Constants: VISIBILITY_BLOCKS, the number of blocks that there is room for. Further silhouettes stay coarse.
@@ -33,7 +33,12 @@ void main() {
     float farthest = VISIBILITY_FARTHEST * longest / scene_length;
     for (int i = int(gl_LocalInvocationIndex); i < TEXELS; i += 64) {
         ivec2 texel = ivec2(i % VISIBILITY_MAP_SIZE, i / VISIBILITY_MAP_SIZE);
-        if (!is_marked(vpl_index, texel, 0) || !is_silhouette(texel, farthest)) {
+        if (!is_marked(vpl_index, texel, 0)) {
+            continue;
+        }
+        visibility_maps[start + i].x |= corner_mark(texel, farthest);
+#if VISIBILITY_BLOCKS > 0
+        if (!is_silhouette(texel, farthest)) {
             continue;
         }
         uint block = atomicAdd(visibility_edge_count, 1u);
@@ -43,5 +48,6 @@ void main() {
             uint groups = ((block + 1u) * uint(VISIBILITY_BLOCK_TEXELS) + 63u) / 64u;
             atomicMax(visibility_edge_groups[0], min(groups, uint(MOST_WORKGROUPS)));
         }
+#endif
     }
 }

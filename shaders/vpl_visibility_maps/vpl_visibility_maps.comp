@@ -1,5 +1,5 @@
 // Visibility maps, part 2: casts one ray for each marked texel of each VPL's hemispherical map, and for the neighbours
-// that tell whether it is at a silhouette. One workgroup for each VPL.
+// that tell whether it is at a corner or a silhouette. One workgroup for each VPL.
 //
 // Reads: VPLs, scene length, ray hierarchy, `visibility_marks`. Writes: `visibility_maps`.
 // Python: renderer/frame/passes/vpl_visibility_maps.py.
@@ -10,7 +10,6 @@
 layout(local_size_x = 64) in;
 
 const int TEXELS = VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE;
-const int REACH = VISIBILITY_MAP_REFINEMENT > 1 ? 1 : 0;
 
 shared int wanted[TEXELS];
 shared int wanted_count;
@@ -28,7 +27,7 @@ void main() {
     // A list, so that no invocation waits for the rays of others.
     for (int i = lane; i < TEXELS; i += 64) {
         ivec2 texel = ivec2(i % VISIBILITY_MAP_SIZE, i / VISIBILITY_MAP_SIZE);
-        if (is_marked(vpl_index, texel, REACH)) {
+        if (is_marked(vpl_index, texel, 1)) {
             wanted[atomicAdd(wanted_count, 1)] = i;
         } else {
             visibility_maps[vpl_index * TEXELS + i] = visibility_nothing(visibility_axis(texel, VISIBILITY_MAP_SIZE));

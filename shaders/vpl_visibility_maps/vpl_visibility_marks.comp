@@ -2,7 +2,7 @@
 // into each VPL's map. One workgroup for each VPL.
 //
 // Reads: VPLs, scene length, receiver bounds. Writes: `visibility_marks`.
-// Python: renderer/frame/passes/vpl_visibility_maps.py.
+// Constants: DISC_LARGEST_FALLOFF, the greatest α. Python: renderer/frame/passes/vpl_visibility_maps.py.
 #include "common/scene_length.glsl"
 #include "common/virtual_point_lights.glsl"
 #include "common/vpl_visibility.glsl"
@@ -38,13 +38,14 @@ float greatest_place(float u, vec2 v, vec2 z) {
 }
 
 // Mark the texels in whose directions the box lies. `axes` are the columns x + y, x - y and z of the VPL's frame: with
-// u and v along the first two, the hemi-octahedral map is (u, v) / (max(|u|, |v|) + z).
-void mark(ReceiverBounds box, vec3 origin, mat3 axes) {
+// u and v along the first two, the hemi-octahedral map is (u, v) / (max(|u|, |v|) + z). `radius` is a disc's greatest.
+void mark(ReceiverBounds box, vec3 origin, mat3 axes, float radius) {
     vec3 low = box.low.xyz - origin;
     vec3 high = box.high.xyz - origin;
     vec3 farthest = max(abs(low), abs(high));
     float margin = ROUNDING * (farthest.x + farthest.y + farthest.z);
-    // The least dot product of offset and normal: where it is positive, all face away.
+    // The least dot product of offset and normal: where it is positive, all face away from the VPL's middle, and beyond
+    // `radius` from all of a disc.
     vec3 facing = min(
         min(low * box.normal_low.xyz, low * box.normal_high.xyz),
         min(high * box.normal_low.xyz, high * box.normal_high.xyz));
@@ -54,7 +55,7 @@ void mark(ReceiverBounds box, vec3 origin, mat3 axes) {
         dot(half_size, abs(axes[0])), dot(half_size, abs(axes[1])), dot(half_size, abs(axes[2])));
     vec3 from = middle - reach;
     vec3 to = middle + reach;
-    if (facing.x + facing.y + facing.z > margin || to.z < 0.0) {
+    if (facing.x + facing.y + facing.z > margin + radius || to.z < 0.0) {
         return;
     }
     vec2 nearest = max(max(from.xy, -to.xy), 0.0);
@@ -93,7 +94,7 @@ void main() {
         mat3 axes = mat3(frame[0] + frame[1], frame[0] - frame[1], frame[2]);
         vec3 origin = visibility_origin(vpl);
         for (uint i = lane; i < receiver_bounds_count; i += 64u) {
-            mark(receiver_bounds[i], origin, axes);
+            mark(receiver_bounds[i], origin, axes, DISC_LARGEST_FALLOFF * vpl.position_footprint.w);
         }
     }
     barrier();

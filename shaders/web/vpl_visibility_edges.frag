@@ -1,5 +1,5 @@
-// Web page, visibility maps, part 2: copies a texel, or replaces it by the index of its block where a silhouette runs
-// through it.
+// Web page, visibility maps, part 2: marks a texel at a concave corner, or replaces it by the index of its block where a
+// silhouette runs through it.
 //
 // Reads: maps as cast. Writes: maps. Runtime: vpl_visibility_maps/vpl_visibility_edges.comp.
 #include "common/virtual_point_lights.glsl"
@@ -22,8 +22,12 @@ void main() {
     if (index < vpl_count * TEXELS) {
         map_start = index - index % TEXELS;
         ivec2 texel = ivec2(index % SIZE, (index % TEXELS) / SIZE);
-        if (is_silhouette(texel, VISIBILITY_FARTHEST * longest / measured_scene_length())) {
+        float farthest = VISIBILITY_FARTHEST * longest / measured_scene_length();
+        out_texel.x |= corner_mark(texel, farthest);
+#if VISIBILITY_MAP_REFINEMENT > 1
+        if (is_silhouette(texel, farthest)) {
             out_texel = visibility_block(uint(index));
         }
+#endif
     }
 }

@@ -10,11 +10,17 @@ from jaxtyping import Array, Float, Float32, Int
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.frame.capture import CapturedFrame, VisibilityMaps
-from vpltune.renderer.frame.visibility_map_layout import FRAME_TURNS_OVER, VISIBILITY_LIFT
+from vpltune.renderer.frame.visibility_map_layout import (
+    FRAME_TURNS_OVER,
+    VISIBILITY_FIRST_VERTEX,
+    VISIBILITY_LIFT,
+    VISIBILITY_ROUNDING,
+)
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
 
 CHUNK = 128
 """Receivers in one chunk. A choice: with 1,024 VPLs, one value for each pair takes half a MiB."""
+_Vectors = Float[Array, "receivers vpls 3"]
 _PADDINGS = 4
 """The fine texels are padded in steps of 1/`_PADDINGS` of the number of coarse texels. A choice."""
 
@@ -44,6 +50,8 @@ class MapTexels:
     """End of the ray, relative to the map's origin [L]."""
     normal: Float[Array, "texels 3"]
     """Normal of the surface that the ray hit."""
+    corner: Int[Array, "vpls size size"]
+    """Corner marks, 0 for none: shaders/common/vpl_visibility.glsl."""
     block_start: Int[Array, "vpls size size"]
     """Index of the first fine texel in the block of this coarse texel; -1 if it has none."""
     refinement: int = field(metadata={"static": True})
@@ -89,6 +97,7 @@ def map_texels(maps: VisibilityMaps) -> MapTexels:
     return MapTexels(
         _joined(end, np.pad(block_end.reshape(-1, 3), padding)),
         _joined(maps.normal, np.pad(maps.block_normal.reshape(-1, 3), padding)),
+        jnp.asarray(maps.corner),
         jnp.where(maps.block >= 0, maps.distance.size + maps.block * refinement**2, -1),
         refinement,
     )
@@ -156,31 +165,19 @@ def surface_overlap(
         vpls: VPLs, in units of L.
         texels: The maps of the VPLs.
     """
-    size, refinement = texels.block_start.shape[1], texels.refinement
-    block_start = texels.block_start.reshape(-1)
+    lookup = _Lookup(texels)
     frame = hemisphere_frame(vpls.normal)
     origin = visibility_origin(vpls)
-    first = jnp.arange(len(vpls.position)) * size * size
 
     def chunk(inputs: tuple[Array, Array]) -> Array:
         position, normal_world = inputs
         in_frame = partial(jnp.einsum, "rvk,vak->rva", precision="highest")
-        to_receiver = in_frame(position[:, None, :] - origin[None, :, :], frame)
+        receiver = in_frame(position[:, None, :] - origin[None, :, :], frame)
         normal = jnp.einsum("rk,vak->rva", normal_world, frame, precision="highest")
-        asked = (to_receiver[..., 2] > 0.0) & ((to_receiver * normal).sum(-1) < 0.0)
+        above = receiver[..., 2] > 0.0
         # Pairs that exchange no light get any finite direction.
-        to_receiver = jnp.where(asked[..., None], to_receiver, jnp.array([0.0, 0.0, 1.0]))
-        place = (hemi_octahedral_encode(to_receiver) * 0.5 + 0.5) * size
-        texel = jnp.minimum(place.astype(jnp.int32), size - 1)
-        inside = jnp.minimum(((place - texel) * refinement).astype(jnp.int32), refinement - 1)
-        coarse = first + texel[..., 1] * size + texel[..., 0]
-        fine = block_start[coarse] + inside[..., 1] * refinement + inside[..., 0]
-        index = jnp.where(block_start[coarse] >= 0, fine, coarse)
-        end, met_normal = texels.end[index], texels.normal[index]
-        between = end - to_receiver
-        before, behind = (between * normal).sum(-1), (between * met_normal).sum(-1)
-        overlap = jnp.minimum(before, behind) / jnp.linalg.norm(to_receiver, axis=-1)
-        return jnp.where(asked, overlap, -1.0)
+        receiver = jnp.where(above[..., None], receiver, jnp.array([0.0, 0.0, 1.0]))
+        return jnp.where(above, lookup.overlap(receiver, normal), -1.0)
 
     count = receivers.position.shape[0]
     padding = ((0, -count % CHUNK), (0, 0))
@@ -188,3 +185,80 @@ def surface_overlap(
         jnp.pad(values, padding).reshape(-1, CHUNK, 3) for values in (receivers.position, receivers.normal)
     )
     return jax.lax.map(chunk, inputs).reshape(-1, len(vpls.position))[:count]
+
+
+class _Lookup:
+    """The lookup in the maps of all VPLs. Places are in units of a map's finest texels."""
+
+    def __init__(self, texels: MapTexels):
+        self._texels = texels
+        self._size, self._refinement = texels.block_start.shape[1], texels.refinement
+        self._finest = self._size * self._refinement
+        self._first = jnp.arange(texels.block_start.shape[0]) * self._size**2
+        self._corner, self._block_start = texels.corner.reshape(-1), texels.block_start.reshape(-1)
+
+    def overlap(self, receiver: _Vectors, normal: _Vectors) -> Float[Array, "receivers vpls"]:
+        """Overlap of receivers with what the map has in their direction; both in each VPL's frame."""
+        place = (hemi_octahedral_encode(receiver) * 0.5 + 0.5) * self._finest
+        place = jnp.minimum(place, self._finest - 0.5)
+        own_place = place.astype(jnp.int32)
+        coarse, end, met_normal = self._met(own_place)
+        distance = jnp.linalg.norm(receiver, axis=-1)
+        away = _dot(receiver, normal)
+        flat = normal * jnp.array([1.0, 1.0, 0.0])
+        cut = flat * (away / jnp.maximum(_dot(flat, flat), 1e-12))[..., None]
+
+        def rim(other: Array, other_normal: Array) -> Array:
+            return jnp.minimum(_dot(other - receiver, other_normal), _dot(other - cut, other_normal))
+
+        def corner(other: Array, other_normal: Array) -> Array:
+            between = other - receiver
+            reaches = _dot(between, normal) > VISIBILITY_ROUNDING * distance
+            hidden = jnp.where(reaches, _dot(between, other_normal), -distance)
+            return jnp.where(away < 0.0, hidden, rim(other, other_normal))
+
+        before, behind = _dot(end - receiver, normal), _dot(end - receiver, met_normal)
+        overlap = jnp.where(away < 0.0, jnp.minimum(before, behind), rim(end, met_normal))
+        ends, normals = [end], [met_normal]
+        for around in self._around(place, own_place, coarse):
+            on_map = ((around >= 0) & (around < self._finest)).all(-1)[..., None]
+            _, other, other_normal = self._met(jnp.clip(around, 0, self._finest - 1))
+            ends.append(jnp.where(on_map, other, end))
+            normals.append(jnp.where(on_map, other_normal, met_normal))
+        lengths = [jnp.linalg.norm(each, axis=-1) for each in ends]
+
+        def is_behind(i: int, j: int) -> Array:
+            return _dot(ends[i] - ends[j], normals[j]) < -VISIBILITY_ROUNDING * (lengths[i] + lengths[j])
+
+        for i in range(4):
+            counts = (self._corner[coarse] > 0) & ~is_behind(i, 0)
+            for j in range(4):
+                counts = counts & ~is_behind(j, i)
+            overlap = jnp.where(counts, jnp.maximum(overlap, corner(ends[i], normals[i])), overlap)
+        return overlap / distance
+
+    def _met(self, place: Array) -> tuple[Array, Array, Array]:
+        """Index of the coarse texel at a place; the end of the ray there, and the normal that it met."""
+        texel = place // self._refinement
+        coarse = self._first + texel[..., 1] * self._size + texel[..., 0]
+        within = place % self._refinement
+        block = self._block_start[coarse]
+        index = jnp.where(block >= 0, block + within[..., 1] * self._refinement + within[..., 0], coarse)
+        return coarse, self._texels.end[index], self._texels.normal[index]
+
+    def _around(self, place: Array, own_place: Array, coarse: Array) -> list[Array]:
+        """Places in three texels around the own one: across a side, another side, and the vertex between."""
+        side = jnp.where(self._block_start[coarse] >= 0, 1, self._refinement)[..., None]
+        start = own_place // side * side
+        vertex = self._corner[coarse][..., None] - VISIBILITY_FIRST_VERTEX
+        across = jnp.concatenate([vertex & 1, vertex >> 1], axis=-1) > 0
+        beyond = jnp.where(vertex >= 0, across, 2.0 * place >= 2 * start + side)
+        beside = jnp.where(beyond, start + side, start - 1)
+        return [
+            jnp.stack([(beside if x else own_place)[..., 0], (beside if y else own_place)[..., 1]], axis=-1)
+            for x, y in ((1, 0), (0, 1), (1, 1))
+        ]
+
+
+def _dot(a: _Vectors, b: _Vectors) -> Float[Array, "receivers vpls"]:
+    return (a * b).sum(-1)

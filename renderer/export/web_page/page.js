@@ -340,21 +340,20 @@ class Frame {
     }
     const texels = most * bundle.visibility_maps.map_size ** 2;
     const rows = Math.ceil(texels / columns);
-    this.visibility = makeTarget(columns, rows, ["RG32UI"]);
+    [this.castMaps, this.visibility] = [0, 1].map(() => makeTarget(columns, rows, ["RG32UI"]));
     const finer = bundle.visibility_maps.map_refinement;
     if (finer > 1) {
-      this.castMaps = makeTarget(columns, rows, ["RG32UI"]);
       this.visibilityDetails = makeTarget(columns * finer, rows * finer, ["RG32UI"]);
     }
   }
 
-  // Cast the visibility maps, then finer texels at silhouettes.
+  // Cast the visibility maps, mark concave corners, and cast finer texels at silhouettes.
   castVisibility(vpl_count) {
     const values = { ...this.rays, ...this.vplValues(this.vpls), ...this.momentSums, vpl_count };
-    fill(this.castMaps ?? this.visibility, this.programs.vpl_visibility_maps, values);
-    if (this.castMaps) {
-      const { vpl_visibility_edges, vpl_visibility_details } = this.programs;
-      fill(this.visibility, vpl_visibility_edges, { ...values, visibility_atlas: this.castMaps.textures[0] });
+    const { vpl_visibility_maps, vpl_visibility_edges, vpl_visibility_details } = this.programs;
+    fill(this.castMaps, vpl_visibility_maps, values);
+    fill(this.visibility, vpl_visibility_edges, { ...values, visibility_atlas: this.castMaps.textures[0] });
+    if (vpl_visibility_details) {
       fill(this.visibilityDetails, vpl_visibility_details, { ...values, visibility_atlas: this.visibility.textures[0] });
     }
   }

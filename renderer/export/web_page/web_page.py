@@ -47,8 +47,8 @@ _SHADERS = (
     "web/vpl_importance_mean.frag",
 )
 _DISC_SHADERS = ("web/clustered_discs_owners.frag", "web/clustered_discs.frag", "web/vpl_gather_discs.frag")
-_MAP_SHADERS = ("web/vpl_visibility_maps.frag",)
-_DETAIL_SHADERS = ("web/vpl_visibility_edges.frag", "web/vpl_visibility_details.frag")
+_MAP_SHADERS = ("web/vpl_visibility_maps.frag", "web/vpl_visibility_edges.frag")
+_DETAIL_SHADERS = ("web/vpl_visibility_details.frag",)
 _HEADER = """#version 300 es
 precision highp float;
 precision highp int;
@@ -67,8 +67,10 @@ def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
     if not bundle.document["lights"]:
         raise InputError("web page: the view must have a light")
     # One button draws the defaults, which are placed by importance even where the config is not.
-    importance_cells = vpl_importance.importance_cells(len(bundle.document["rsm"]["faces"]))
-    importance = bundle.document["vpl_importance"] | {"cells": importance_cells}
+    faces = bundle.document["rsm"]["faces"]
+    # All orthographic faces of a light lie in its first.
+    outer = {face["light"] if face["orthographic"] else -1 - i for i, face in enumerate(faces)}
+    importance = bundle.document["vpl_importance"] | {"cells": vpl_importance.importance_cells(len(outer))}
     drawn = bundle.document | {"vpl_importance": importance}
     defines = _defines(drawn)
     binary = bundle.binary

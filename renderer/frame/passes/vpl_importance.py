@@ -6,8 +6,6 @@ from vpltune.renderer.frame.rsm_resolution import FEW_FACES
 from vpltune.renderer.gpu.gpu_program import ComputeProgram
 from vpltune.renderer.gpu.render_targets import GBUFFER_READS, RSM_READS, ReflectiveShadowMap
 from vpltune.renderer.gpu.resources import Resources
-from vpltune.renderer.scene.light_faces import face_count
-from vpltune.renderer.scene.scene import Light
 
 CELLS = 64
 """Cells along the side of an RSM face, each with one importance. A choice."""
@@ -37,9 +35,9 @@ _CELL_BYTES, _RECEIVER_BYTES = 32, 32
 """Bytes of the structures in shaders/common/vpl_importance_form.glsl."""
 
 
-def importance_cells(lights: tuple[Light, ...]) -> int:
-    """Cells along the side of each RSM face of these lights."""
-    return CELLS if face_count(lights, nested_faces=0) <= FEW_FACES else CELLS_OF_MANY
+def importance_cells(outer_faces: int) -> int:
+    """Cells along the side of each RSM face, where so many lie in no other."""
+    return CELLS if outer_faces <= FEW_FACES else CELLS_OF_MANY
 
 
 class VplImportancePass(FramePass):

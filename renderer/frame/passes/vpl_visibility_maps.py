@@ -1,5 +1,6 @@
 """VPL visibility maps: the surfaces every VPL sees, in a small hemispherical map, cast anew each frame."""
 
+from vpltune.renderer.config.artist_parameters import parameter_spec
 from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
 from vpltune.renderer.frame.visibility_map_layout import MAP_READS, TEXEL_BYTES, VisibilityMapLayout
 from vpltune.renderer.gpu.gpu_program import ComputeProgram
@@ -42,7 +43,7 @@ class VplVisibilityMapsPass(FramePass):
         self._marks = ComputeProgram(
             resources,
             "vpl_visibility_maps/vpl_visibility_marks",
-            layout.defines,
+            {**layout.defines, "DISC_LARGEST_FALLOFF": parameter_spec("falloff_footprint").high},
             reads=("frame_statistics", "virtual_point_lights", "receiver_bounds", *MAP_READS),
             writes=("visibility_marks",),
         )
@@ -53,9 +54,6 @@ class VplVisibilityMapsPass(FramePass):
             reads=(*_CAST_READS, "visibility_details", "visibility_marks"),
             writes=("visibility_maps",),
         )
-        self._refines = blocks > 0
-        if not self._refines:
-            return
         self._edges = ComputeProgram(
             resources,
             "vpl_visibility_maps/vpl_visibility_edges",
@@ -63,6 +61,9 @@ class VplVisibilityMapsPass(FramePass):
             reads=("frame_statistics", "visibility_details", "visibility_marks"),
             writes=("visibility_maps", "visibility_edges"),
         )
+        self._refines = blocks > 0
+        if not self._refines:
+            return
         self._details = ComputeProgram(
             resources,
             "vpl_visibility_maps/vpl_visibility_details",
@@ -79,7 +80,7 @@ class VplVisibilityMapsPass(FramePass):
         uniforms = {"longest": inputs.scene_diagonal, "vpl_count": self._vpl_count}
         self._marks.dispatch(*groups, vpl_count=self._vpl_count)
         self._maps.dispatch(*groups, **uniforms)
+        self._resources.write("visibility_edges", EMPTY_DISPATCH)
+        self._edges.dispatch(*groups, **uniforms)
         if self._refines:
-            self._resources.write("visibility_edges", EMPTY_DISPATCH)
-            self._edges.dispatch(*groups, **uniforms)
             self._details.dispatch_indirect("visibility_edges", longest=inputs.scene_diagonal)

@@ -109,7 +109,8 @@ def cast_map(vpl: dict, length: float, size: int, refinement: int) -> dict[str, 
         return end, normal
 
     end, normal = cast(size)
-    edge = visibility_maps.is_silhouette(end, normal, visibility_maps.FARTHEST * DIAGONAL / length)
+    farthest = visibility_maps.FARTHEST * DIAGONAL / length
+    edge = visibility_maps.is_silhouette(end, normal, farthest)
     block = np.full((size, size), -1)
     block[edge] = np.arange(edge.sum())
     finer = [
@@ -119,6 +120,7 @@ def cast_map(vpl: dict, length: float, size: int, refinement: int) -> dict[str, 
     return {
         "end": end,
         "normal": normal,
+        "corner": visibility_maps.corner_marks(end, normal, farthest),
         "block": block,
         "block_end": finer[0],
         "block_normal": finer[1],

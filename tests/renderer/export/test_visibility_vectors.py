@@ -9,7 +9,7 @@ from vector_file import PI, VECTORS, boxes, buffer_of, inputs_of, light_of, vpl_
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.frame.capture import octahedral_decode
 from vpltune.renderer.frame.passes.vpl_visibility_maps import VplVisibilityMapsPass
-from vpltune.renderer.frame.visibility_map_layout import VisibilityMapLayout
+from vpltune.renderer.frame.visibility_map_layout import VISIBILITY_CORNER_BITS, VisibilityMapLayout
 from vpltune.renderer.gpu.ray_hierarchy import RayHierarchy
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
@@ -110,7 +110,8 @@ def test_shaders_see_this(gl_context, pair):
     bias, softness = CASE["bias_softness"][pair]
     texels = packed(gl_context, MAP["end"], MAP["normal"]).copy()
     blocks = MAP["block"].ravel()
-    texels[blocks >= 0, 0] = 0x80000000
+    texels[:, 0] |= MAP["corner"].ravel().astype(np.uint32)
+    texels[blocks >= 0, 0] = 0x80000001
     texels[blocks >= 0, 1] = blocks[blocks >= 0]
     maps = {
         "visibility_maps": buffer_of(gl_context, texels),
@@ -161,7 +162,12 @@ def test_the_surrogate_sees_this(pair):
             single(VPL["footprint"], LENGTH),
             single(VPL["flux"], LENGTH**2),
         ),
-        MapTexels(*joined, jnp.asarray(start[None], jnp.int32), REFINEMENT),
+        MapTexels(
+            *joined,
+            jnp.asarray(MAP["corner"][None], jnp.int32),
+            jnp.asarray(start[None], jnp.int32),
+            REFINEMENT,
+        ),
         VisibilityParameters(jnp.float32(bias), jnp.float32(softness)),
     )
     np.testing.assert_allclose(
@@ -170,7 +176,7 @@ def test_the_surrogate_sees_this(pair):
 
 
 def test_maps_are_cast_like_this(gl_context):
-    """Distances to 1e-4, normals to 16 bits, and the same texels at silhouettes with the same finer rays."""
+    """Distances to 1e-4, normals to 16 bits; the same corners, silhouettes and finer rays."""
     scene = SceneBuffers(gl_context, boxes())
     hierarchy = RayHierarchy(gl_context, boxes(), scene)
     resources = scene.resources()
@@ -184,6 +190,7 @@ def test_maps_are_cast_like_this(gl_context):
     texels = np.frombuffer(resources.read("visibility_maps"), np.uint32).reshape(SIZE, SIZE, 2)
     refined = texels[..., 0] >> 31 != 0
     np.testing.assert_array_equal(refined, MAP["block"] >= 0)
+    np.testing.assert_array_equal(texels[..., 0] & VISIBILITY_CORNER_BITS, MAP["corner"])
     assert_met(texels[~refined], MAP["end"][~refined], MAP["normal"][~refined])
     # Blocks lie in the order in which invocations came to them.
     details = resources.read("visibility_details")

@@ -12,6 +12,12 @@ vec2 past_chord(float t) {
     return vec2(share, 2.0 / (3.0 * 3.14159265358979) * pow(half_chord, 3.0) / max(share, least_part));
 }
 
+// Q and the axial term of the form factors to a disc.
+vec2 disc_axial(float dd, float height, float rr) {
+    float excess = dd - rr, q = sqrt(max(excess * excess + 4.0 * height * height * rr, 1e-36)), larger = q + abs(excess);
+    return vec2(q, excess > 0.0 ? height * height / larger : larger / (4.0 * rr));
+}
+
 // Irradiance of a flux of π on a receiver with normal n. The disc has normal m; d is the vector from the receiver to
 // its centre. All lengths are in units of scene_length.
 float disc_form(vec3 d, vec3 n, vec3 m, float radius) {
@@ -23,11 +29,13 @@ float disc_form(vec3 d, vec3 n, vec3 m, float radius) {
     if (fade == 0.0 || part.x < least_part) { return 0.0; }
     // The part above the receiver's horizon is taken as a disc of its own area around its own centroid (Howell, Siegel
     // and Mengüç 2010, form factors to a disc parallel and at right angles to the element).
-    d += (n - between * m) * (part.y * radius / slope);
-    float dd = dot(d, d), rr = radius * radius * part.x, excess = dd - rr;
-    float q = sqrt(max(excess * excess + 4.0 * height * height * rr, 1e-36)), larger = q + abs(excess);
-    float axial = excess > 0.0 ? height * height / larger : larger / (4.0 * rr);
-    vec3 vector = (d + height * m) * (height / (q + dd + rr)) - m * axial;
-    return max(dot(n, vector), 0.0) * 2.0 * fade * part.x / q;
+    vec3 middle = d + (n - between * m) * (part.y * radius / slope);
+    float dd = dot(middle, middle), rr = radius * radius * part.x;
+    vec2 axial = disc_axial(dd, height, rr), uncut = disc_axial(dot(d, d), height, radius * radius);
+    vec3 vector = (middle + height * m) * (height / (axial.x + dd + rr)) - m * axial.y;
+    // Close to the disc, it is nearly a half-space.
+    float facing_form = 2.0 * radius * radius * uncut.y / uncut.x;
+    float least = 0.5 * (1.0 - between) * pow(facing_form, 4.0) / (radius * radius);
+    return max(dot(n, vector) * 2.0 * part.x / axial.x, least) * fade;
 }
 #endif

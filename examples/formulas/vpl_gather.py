@@ -37,14 +37,23 @@ def disc_form(position, normal, vpls: Vpls, alpha: float, scene_length: float) -
     to_part = to_vpl + upwards * (offset * radius)[..., None]
     radius_squared = radius**2 * share
     squared = dot(to_part, to_part)
+    q, axial = disc_axial(squared, height, radius_squared)
+    lateral = height / (q + squared + radius_squared)
+    vector = (to_part + height[..., None] * vpl_normal) * lateral[..., None] - vpl_normal * axial[..., None]
+    # Close to the disc, it is nearly a half-space.
+    uncut_q, uncut_axial = disc_axial(dot(to_vpl, to_vpl), height, radius**2)
+    facing_form = 2.0 * radius**2 * uncut_axial / uncut_q
+    least = 0.5 * (1.0 - between) * facing_form**4 / radius**2
+    received = np.maximum(dot(normal, vector) * 2.0 * share / q, least) * fade
+    return np.where(lit, received, 0.0) / scene_length**2
+
+
+def disc_axial(squared, height, radius_squared) -> tuple[np.ndarray, np.ndarray]:
+    """Q and the axial term of the form factors to a disc of a squared radius."""
     excess = squared - radius_squared
     q = np.sqrt(np.maximum(excess**2 + 4.0 * height**2 * radius_squared, 1e-36))
     larger = q + np.abs(excess)
-    axial = np.where(excess > 0.0, height**2 / larger, larger / (4.0 * radius_squared))
-    lateral = height / (q + squared + radius_squared)
-    vector = (to_part + height[..., None] * vpl_normal) * lateral[..., None] - vpl_normal * axial[..., None]
-    received = np.maximum(dot(normal, vector), 0.0) * 2.0 * fade * share / q
-    return np.where(lit, received, 0.0) / scene_length**2
+    return q, np.where(excess > 0.0, height**2 / larger, larger / (4.0 * radius_squared))
 
 
 def disc_past_chord(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -11,6 +11,10 @@
 // at right angles to it (Howell, Siegel and Mengüç 2010). From afar, E becomes Φ cosθ_x cosθ_m/(πd²).
 // This holds while the whole disc is above the receiver's horizon. Otherwise the part above the horizon is taken as a
 // disc of its own area around its own centroid. (Baum et al. 1989 clip polygons at the horizon.)
+// Close to the disc, that replacement dips below the horizon, and its two sides cancel. There the emitter is nearly a
+// half-space, whose form factor is (1 - m·n)/2. So E is at least Φ/(πl²) (1 - m·n)/2 F⁴, F being the form factor of the
+// uncut disc for a receiver that faces it. The exponent has the least error against numerical integrals
+// (tests/physics/test_vpl_disc.py).
 
 // A chord cuts a unit disc. `t` is the centre's signed distance from the chord, positive where the centre is on the
 // kept side. Returns x, the kept part's share of the area, and y, the distance of its centroid from the centre.
@@ -25,6 +29,16 @@ vec2 disc_past_chord(float t) {
     float share = t > 0.0 ? 1.0 - lesser : lesser;
     float moment = 2.0 / (3.0 * PI) * half_chord * half_chord * half_chord;
     return vec2(share, moment / max(share, DISC_LEAST_PART));
+}
+
+// Q, and the axial term h²/(Q + S - 2l²), for a receiver at `height` over the disc's plane.
+vec2 disc_axial(float distance_squared, float height, float radius_squared) {
+    // Q + S - 2l² = Q + excess. For a negative excess it is computed as 4h²l²/(Q - excess), where no digits cancel.
+    // 1e-36, a length in L to the fourth power, keeps Q above 0.
+    float excess = distance_squared - radius_squared;
+    float q = sqrt(max(excess * excess + 4.0 * height * height * radius_squared, 1e-36));
+    float larger = q + abs(excess);
+    return vec2(q, excess > 0.0 ? height * height / larger : larger / (4.0 * radius_squared));
 }
 
 // Vector irradiance in units of Φ/π: its dot product with the receiver's normal is the irradiance, where positive.
@@ -42,14 +56,14 @@ vec3 disc_vector(vec3 to_vpl, vec3 normal, vec3 vpl_normal, float radius) {
     vec3 to_part = to_vpl + (normal - between * vpl_normal) * (part.y * radius / slope);
     float radius_squared = radius * radius * part.x;
     float distance_squared = dot(to_part, to_part);
-    // Q + S - 2l² = Q + excess. For a negative excess it is computed as 4h²l²/(Q - excess), where no digits cancel.
-    // 1e-36, a length in L to the fourth power, keeps Q above 0.
-    float excess = distance_squared - radius_squared;
-    float q = sqrt(max(excess * excess + 4.0 * height * height * radius_squared, 1e-36));
-    float larger = q + abs(excess);
-    float axial = excess > 0.0 ? height * height / larger : larger / (4.0 * radius_squared);
-    float lateral = height / (q + distance_squared + radius_squared);
-    return ((to_part + height * vpl_normal) * lateral - vpl_normal * axial) * (2.0 * fade * part.x / q);
+    vec2 axial = disc_axial(distance_squared, height, radius_squared);
+    float lateral = height / (axial.x + distance_squared + radius_squared);
+    vec3 vector = ((to_part + height * vpl_normal) * lateral - vpl_normal * axial.y) * (2.0 * part.x / axial.x);
+    vec2 uncut = disc_axial(dot(to_vpl, to_vpl), height, radius * radius);
+    float facing_form = 2.0 * radius * radius * uncut.y / uncut.x;
+    float squared_form = facing_form * facing_form;
+    float least = 0.5 * (1.0 - between) * squared_form * squared_form / (radius * radius);
+    return (vector + normal * max(least - dot(normal, vector), 0.0)) * fade;
 }
 
 // Vector irradiance [1/world units²] of one watt of the VPL's flux. The counterpart for points is

@@ -18,11 +18,12 @@ def form(receiver, normal, radius):
     return np.asarray(disc_form(*(jnp.asarray(value, jnp.float32) for value in lengths)))
 
 
-def integral(receiver, normal, radius):
+def integral(receiver, normal, radius, finer=1):
     """The same by summing small pieces of the disc, each where it is over the receiver's horizon."""
-    r = np.sqrt((np.arange(RINGS) + 0.5) / RINGS) * radius
-    angle = (np.arange(SECTORS) + 0.5) / SECTORS * 2.0 * np.pi
-    piece = np.stack([np.outer(r, np.cos(angle)), np.outer(r, np.sin(angle)), np.zeros((RINGS, SECTORS))], -1)
+    rings, sectors = finer * RINGS, finer * SECTORS
+    r = np.sqrt((np.arange(rings) + 0.5) / rings) * radius
+    angle = (np.arange(sectors) + 0.5) / sectors * 2.0 * np.pi
+    piece = np.stack([np.outer(r, np.cos(angle)), np.outer(r, np.sin(angle)), np.zeros((rings, sectors))], -1)
     to_piece = piece - receiver
     squared = (to_piece**2).sum(-1)
     cosines = np.maximum(to_piece @ normal, 0.0) * np.maximum(-to_piece[..., 2], 0.0)
@@ -72,13 +73,13 @@ def test_exact_over_the_horizon():
 
 
 @pytest.mark.parametrize(
-    ("nearest", "reach", "lost"), [(0.05, 1.0, 0.35), (1.0, 3.0, 0.15), (3.0, 10.0, 0.03)]
+    ("nearest", "reach", "off"), [(0.05, 1.0, 0.06), (1.0, 3.0, 0.15), (3.0, 10.0, 0.03)]
 )
-def test_cut_at_the_horizon(nearest, reach, lost):
-    """The part over the horizon, as a disc, gives less than its pieces, by `lost`, and nowhere much more.
+def test_cut_at_the_horizon(nearest, reach, off):
+    """The part over the horizon gives what its pieces give, but for `off` in the mean.
 
-    A disc of the part's area still reaches below the horizon, where light counts as negative: the nearer, the
-    more is lost.
+    As a disc of its area, it still reaches below the horizon, where light counts as negative. That loses the
+    more the nearer it is, until the half-space takes over.
     """
     receiver, normal = random_receivers(600, 2, reach)
     facing, slope = -(receiver * normal).sum(1), np.sqrt(1.0 - normal[:, 2] ** 2)
@@ -87,8 +88,25 @@ def test_cut_at_the_horizon(nearest, reach, lost):
     expected = np.array([integral(receiver[i], normal[i], 1.0) for i in chosen])
     found = form(receiver[chosen], normal[chosen], 1.0)
     assert len(chosen) > 10
-    assert -lost < found.sum() / expected.sum() - 1.0 < 0.01
-    assert (found - expected).max() < 0.1
+    assert abs(found.sum() / expected.sum() - 1.0) < off
+    assert (found - expected).max() < 0.25
+
+
+def test_near_a_cut_disc_it_is_a_half_space():
+    """Receivers of a wall that stands on the disc, within a tenth of its radius: without bias, and within 0.12
+    of its radiosity in the mean square. The part's disc alone lost a quarter of the radiosity here, all of it
+    at the foot."""
+    random = np.random.default_rng(3)
+    count = 60
+    along = random.uniform(-1.2, 1.2, (count, 2))
+    receiver = np.column_stack([along, random.uniform(0.01, 0.1, count)])
+    angle = random.uniform(0.0, 2.0 * np.pi, count)
+    normal = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(count)])
+    expected = np.array([integral(r, n, 1.0, finer=6) for r, n in zip(receiver, normal, strict=True)])
+    error = form(receiver, normal, 1.0) - expected
+    assert expected.mean() > 0.2
+    assert abs(error.mean()) < 0.03
+    assert np.sqrt((error**2).mean()) < 0.12
 
 
 def test_share_and_centroid_of_a_part():

@@ -30,6 +30,22 @@ def disc_past_chord(t: Float[Array, "*n"]) -> tuple[Float[Array, "*n"], Float[Ar
     return share, moment / jnp.maximum(share, LEAST_PART)
 
 
+def disc_axial(
+    distance_squared: Float[Array, "*n"], height: Float[Array, "*n"], radius_squared: Float[Array, "*m"]
+) -> tuple[Float[Array, "*n"], Float[Array, "*n"]]:
+    """Q and the axial term h²/(Q + S − 2l²) of a disc. Twin: `disc_axial` in GLSL.
+
+    Args:
+        distance_squared: Squared distance of the receiver from the disc's centre.
+        height: Height of the receiver above the disc's plane, at least 0.
+        radius_squared: Squared radius of the disc.
+    """
+    excess = distance_squared - radius_squared
+    q = jnp.sqrt(jnp.maximum(excess**2 + 4.0 * height**2 * radius_squared, 1e-36))
+    larger = q + jnp.abs(excess)
+    return q, jnp.where(excess > 0.0, height**2 / larger, larger / (4.0 * radius_squared))
+
+
 def disc_form(
     squared: Float[Array, "*n"],
     facing: Float[Array, "*n"],
@@ -59,10 +75,10 @@ def disc_form(
     shift = offset * radius
     distance_squared = squared + 2.0 * shift * (facing + between * height) / slope + shift**2
     radius_squared = radius**2 * share
-    excess = distance_squared - radius_squared
-    q = jnp.sqrt(jnp.maximum(excess**2 + 4.0 * height**2 * radius_squared, 1e-36))
-    larger = q + jnp.abs(excess)
-    axial = jnp.where(excess > 0.0, height**2 / larger, larger / (4.0 * radius_squared))
+    q, axial = disc_axial(distance_squared, height, radius_squared)
     lateral = height / (q + distance_squared + radius_squared)
     received = (facing + shift * slope + height * between) * lateral - between * axial
-    return jnp.where(lit, jnp.maximum(received, 0.0) * (2.0 * fade * share / q), 0.0)
+    uncut_q, uncut_axial = disc_axial(squared, height, radius**2)
+    facing_form = 2.0 * radius**2 * uncut_axial / uncut_q
+    least = 0.5 * (1.0 - between) * facing_form**4 / radius**2
+    return jnp.where(lit, jnp.maximum(received * (2.0 * share / q), least) * fade, 0.0)

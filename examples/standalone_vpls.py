@@ -67,9 +67,9 @@ def importance(atlas, seen, bundle):
     squared = np.maximum(dot(to_cell, to_cell), 1e-30)
     # Below 1e-3 a surface lies in the other's plane, and rounding decides on which side.
     cosines = [dot(points[:, None, 4:7], to_cell), dot(-normal, to_cell)] / np.sqrt(squared) - 1e-3
-    form = np.maximum(np.prod(np.maximum(cosines, 0), axis=0), 0.01) / (
-        np.pi * squared + rules["spread"] * area
-    )
+    # What faces away but lies near counts a little: a roof over a lit floor.
+    both = np.maximum(np.prod(np.maximum(cosines, 0), axis=0), 0.01)
+    form = both / (np.pi * squared + rules["spread"] * area)
     form *= straight > 1e-4
     received = (form @ total)[:, 0]
     weight = 1 / (received**2 / (rules["dark_share"] * (received**2).mean()) + 1)

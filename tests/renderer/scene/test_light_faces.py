@@ -59,8 +59,8 @@ def test_snapping_costs_little_size():
         fitted, snapped = (
             light_records((light,), bounds, grid).faces[0]["extent"] for grid in (TIGHT, SNAPPED)
         )
-        assert (snapped["extent"] >= fitted["extent"]).all()
-        assert (snapped["extent"] <= fitted["extent"] * SIZE_STEP * 1.01).all()
+        assert (snapped >= fitted).all()
+        assert (snapped <= fitted * SIZE_STEP * 1.01).all()
 
 
 def test_a_turning_light_turns_its_face_smoothly():

@@ -18,10 +18,10 @@ from vpltune.tuner.prior.scene_generator import generated_scene
 MOVES = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.1, 0.2, 0.0], [0.05, -0.1, 0.0, -0.3]], np.float32)
 """Offsets from the default point."""
 # The values under the present `CAPTURE_VERSION`, printed by the test below.
-LOSSES = (0.0028397, 0.016438, 0.12207)
+LOSSES = (0.0011636, 0.014948, 0.1041)
 STATISTICS = (
-    *(0.94146, 0.28611, 0.19322, 0.49567, 0.53662, 0.72935),
-    *(0.45379, 0.71983, 0.27795, 0.30094, 0.2563, 0.3125),
+    *(0.93767, 0.29866, 0.19537, 0.49139, 0.56506, 0.72191),
+    *(0.46066, 0.72403, 0.28076, 0.30802, 0.25833, 0.3125),
 )
 
 
@@ -42,7 +42,8 @@ def test_what_the_runtime_does_otherwise_is_another_capture(monkeypatch):
 
 def test_captures_are_those_of_their_version(gl_context, monkeypatch):
     """A capture gives the recorded values. If this fails, users' caches hold outdated captures: increase
-    `CAPTURE_VERSION`, and record the new values here. The tolerance covers the rounding of other drivers."""
+    `CAPTURE_VERSION`, and record the new values here. The tolerance covers the rounding of other drivers; the
+    first loss is nearly zero."""
     gl_context.__enter__()
     monkeypatch.setattr(prior_library, "ROTATIONS", {32: ((0.0, 0.0),)})
     scene = generated_scene(0)
@@ -54,5 +55,5 @@ def test_captures_are_those_of_their_version(gl_context, monkeypatch):
     point = default_point(ArtistParameters())
     losses = [float(table_loss(table, point + move)) for move in MOVES]
     print(losses, [round(float(v), 5) for v in found.statistics[0]])
-    np.testing.assert_allclose(losses, LOSSES, rtol=5e-3)
+    np.testing.assert_allclose(losses, LOSSES, rtol=5e-3, atol=1e-4)
     np.testing.assert_allclose(found.statistics[0], STATISTICS, atol=2e-3)

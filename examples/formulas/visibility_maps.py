@@ -62,7 +62,7 @@ def rim_overlap(end, end_normal, receiver, receiver_normal) -> float:
     """`overlap` for a receiver whose tangent plane hides the middle of a disc."""
     flat = receiver_normal * [1.0, 1.0, 0.0]
     cut = flat * (dot(receiver, receiver_normal) / max(dot(flat, flat), 1e-12))
-    return np.minimum(dot(end - receiver, end_normal), dot(end - cut, end_normal)) / length(receiver)
+    return float(min(dot(end - receiver, end_normal), dot(end - cut, end_normal)) / length(receiver))
 
 
 def corner_overlap(end, end_normal, receiver, receiver_normal) -> float:
@@ -71,12 +71,12 @@ def corner_overlap(end, end_normal, receiver, receiver_normal) -> float:
         return rim_overlap(end, end_normal, receiver, receiver_normal)
     if not dot(end - receiver, receiver_normal) > ROUNDING * length(receiver):
         return -1.0
-    return dot(end - receiver, end_normal) / length(receiver)
+    return float(dot(end - receiver, end_normal) / length(receiver))
 
 
 def is_behind(end, other, other_normal) -> bool:
     """Whether a hit lies behind the plane of another one, by more than rounding."""
-    return dot(end - other, other_normal) < -ROUNDING * (length(end) + length(other))
+    return bool(dot(end - other, other_normal) < -ROUNDING * (length(end) + length(other)))
 
 
 def corner_marks(end: np.ndarray, normal: np.ndarray, farthest: float) -> np.ndarray:
@@ -89,7 +89,7 @@ def corner_marks(end: np.ndarray, normal: np.ndarray, farthest: float) -> np.nda
 
     def is_corner(a: tuple[int, int], b: tuple[int, int]) -> bool:
         behind = is_behind(end[a], end[b], normal[b]) or is_behind(end[b], end[a], normal[a])
-        return dot(normal[a], normal[b]) < CORNER_COSINE and not behind
+        return bool(dot(normal[a], normal[b]) < CORNER_COSINE) and not behind
 
     for own in np.ndindex(size, size):
         for vertex, (x, y) in enumerate(VERTICES):

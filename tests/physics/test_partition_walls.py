@@ -61,7 +61,7 @@ def check_partition(gl_context, thickness: str, parameters: ArtistParameters) ->
     assert leak.max() <= 0.01 * usual
     maps = far.visibility_maps
     assert maps is not None
-    assert (maps.corner > 0).mean() > 0.1
+    assert (maps.corner > 0).mean() > 0.01
     receivers, vpls = gather_inputs(far)
     twin = lit_by(far, parameters, map_visibility(far, receivers, vpls, parameters))
     assert np.abs(twin - leak).max() <= 1e-3 * usual
@@ -113,7 +113,7 @@ def test_a_corner_has_a_closed_form():
         vpl = VirtualPointLights(
             jnp.array([[0.0, 0.0, -1e-5]]), jnp.array([[0.0, 0.0, 1.0]]), jnp.array([1e-3]), jnp.ones((1, 3))
         )
-        normal = np.tile(np.float32([0.0, 0.0, -1.0]), (len(places), 1))
+        normal = np.tile(np.array([0.0, 0.0, -1.0], np.float32), (len(places), 1))
         seen = vpl_visibility(
             Receivers(jnp.asarray(places, jnp.float32), jnp.asarray(normal)),
             vpl,

@@ -93,8 +93,10 @@ def test_cut_at_the_horizon(nearest, reach, off):
 
 
 def test_near_a_cut_disc_it_is_a_half_space():
-    """Receivers of a wall that stands on the disc, within a tenth of its radius: without bias, and within 0.12
-    of its radiosity in the mean square. The disc of the part alone lost a quarter of the radiosity here."""
+    """A wall that stands on the disc, within a tenth of its radius: no bias, and 0.12 of the radiosity RMS.
+
+    The disc of the part alone lost a quarter of the radiosity here.
+    """
     random = np.random.default_rng(3)
     count = 60
     along = random.uniform(-1.2, 1.2, (count, 2))

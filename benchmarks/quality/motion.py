@@ -3,7 +3,8 @@
 There are two clips. In one, a spot sweeps through the gallery. In the other, a sun stands still over a
 courtyard whose bounds grow, because a part of it rises. The figure is the mean absolute change of indirect
 irradiance from frame to frame, divided by the mean irradiance, minus the same figure of a reference: the
-frames with 16 times the VPLs from an RSM of twice the resolution.
+frames with 16 times the VPLs from an RSM of twice the resolution. VPLs are points, which stir as the RSM
+does: clusters add movement of their own.
 
 `python -m benchmarks.quality.motion FOLDER` writes motion.png, a plot of the change at every step, and
 motion.mp4, the clip of the spot. `python -m benchmarks.quality.motion FOLDER box` writes box.mp4, in which a
@@ -162,7 +163,12 @@ def _shipped(name: str) -> tuple[Scene, View]:
 
 def _config(vpl_factor: int = 1, rsm_factor: int = 1) -> TunedConfig:
     return TunedConfig(
-        ArtistParameters(vpl_count=VPL_COUNT * vpl_factor),
+        ArtistParameters(
+            vpl_count=VPL_COUNT * vpl_factor,
+            falloff_footprint=0.5,
+            density_importance=0.0,
+            lloyd_iterations=0,
+        ),
         quality=Quality(rsm_resolution=RSM_RESOLUTION * rsm_factor),
     )
 

@@ -88,6 +88,7 @@ def test_a_row_that_was_left_out_has_dashes(capfd, monkeypatch):
     assert "–" in shown and "nan" not in shown
 
 
+@pytest.mark.slow
 def test_steadier_than_without(monkeypatch):
     """A short run of the motion benchmark: the snapped sun is at least ten times as steady."""
     import benchmarks.quality.motion as motion

@@ -1,6 +1,7 @@
 """A lamp carried from a small room into a hall: with `auto`, parameters follow and none of them jumps."""
 
 import numpy as np
+import pytest
 
 from benchmarks.quality.carried_light import auto_config, carried_light, drawn_places
 from vpltune.renderer.frame.clip_state import ClipState
@@ -10,6 +11,7 @@ from vpltune.renderer.frame.runtime import Runtime
 FRAMES = 40
 
 
+@pytest.mark.slow
 def test_no_parameter_jumps(gl_context):
     """Even at a quarter of the clip's frames, each moves by at most `LARGEST_STEP` of its axis a frame."""
     clip = carried_light((48, 27), FRAMES)

@@ -142,6 +142,7 @@ def test_scale_changes_nothing(gl_context, factor):
     assert relative_rms(grown, image) < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_more_vpls_keep_the_mean(gl_context, light):
     """Doubling the VPL count with maps changes the mean irradiance by less than 1 %, as without maps."""

@@ -29,6 +29,7 @@ def inside_view(light: str, size=(64, 48)) -> View:
     return View(view.name, view.split, size, camera, view.lights)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_mean_irradiance_is_stable(gl_context, light):
     """Doubling the VPL count, the RSM resolution or the image size moves the mean by less than 1 %.
@@ -51,10 +52,10 @@ def test_mean_irradiance_is_stable(gl_context, light):
 @pytest.mark.parametrize("factor", [0.01, 0.1, 10.0, 100.0])
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_scale_changes_nothing(gl_context, light, factor):
-    """Scene, camera and light scaled together give the same image from the same config, to 1e-3.
+    """Scene, camera and light scaled together give the same image from the same config, to 2e-3.
 
     The bound is on the relative RMSE: where rounding moves a silhouette or a shadow's edge by a texel,
-    single pixels may differ.
+    single pixels may differ, and an RSM sample between two clusters may change its owner.
     """
     view, config = room_view(light), TunedConfig(PARAMETERS)
     runtime = Runtime(colored_room(), context=gl_context)
@@ -62,7 +63,7 @@ def test_scale_changes_nothing(gl_context, light, factor):
     image = runtime.render_radiance(view, config)
     grown = other.render_radiance(scaled_view(view, factor), config)
     error = np.sqrt(np.mean((grown - image) ** 2) / np.mean(image**2))
-    assert error < 1e-3
+    assert error < 2e-3
     assert other.capture(scaled_view(view, factor), config).scene_length == pytest.approx(
         factor * runtime.capture(view, config).scene_length, rel=1e-3
     )

@@ -143,7 +143,7 @@ def test_few_vpls_are_placed_as_the_runtime_places_them(tmp_path, light, placeme
 
 @pytest.mark.parametrize("file", sorted(READER.parent.glob("standalone_*")), ids=lambda file: file.name)
 def test_the_reader_is_short(file):
-    assert len(file.read_text(encoding="utf-8").splitlines()) < 150
+    assert len(file.read_text(encoding="utf-8").splitlines()) < 240
 
 
 def test_a_bundle_is_json_that_describes_its_bytes(tmp_path):

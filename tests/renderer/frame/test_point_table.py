@@ -71,6 +71,7 @@ def deviation(gl_context, table: str, density_exponent: float) -> float:
     return float(irradiance.std(axis=0).mean() / irradiance.mean())
 
 
+@pytest.mark.slow
 def test_r2_clumps_half_as_much_as_poisson_discs(gl_context):
     """Show 4. Measured: Poisson discs 1.6 % of the mean; R2 0.5 %, 0.3 % and 0.5 % (γ = 0, 1/2, 1)."""
     poisson = deviation(gl_context, "poisson_disc", 0.0)

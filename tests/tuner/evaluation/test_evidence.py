@@ -93,5 +93,5 @@ def test_parameters_that_the_views_leave_open_are_named():
     found = undetermined(known, ArtistParameters())
     assert found == (
         "intensity is not determined by these views: the fit ran to its bound 20; the config has 1",
-        "falloff_footprint is not determined by these views: its interval is 0.05 to 20; the config has 0.5",
+        "falloff_footprint is not determined by these views: its interval is 0.05 to 20; the config has 1",
     )

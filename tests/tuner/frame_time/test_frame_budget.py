@@ -68,7 +68,7 @@ def test_a_budget_below_the_cheapest_frame_is_refused(steady, prepared):
 def test_no_frame_settles_on_fewer_vpls_than_a_budget_must_have(steady, prepared):
     """2.35 ms would do for one VPL; four take 2.51, and that is the least that is asked of a budget."""
     budget = FrameBudget(prepared, START, (24, 18))
-    choice = Quality(rsm_resolution=256)
+    choice = Quality(1, rsm_resolution=256)
     assert budget._settle(choice, 2.65).vpl_count >= frame_budget.LEAST_COUNT
     with pytest.raises(InputError, match=r"no frame could be measured within 2\.3 ms; the fastest took 2\."):
         budget._settle(choice, 2.3)

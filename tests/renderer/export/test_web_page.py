@@ -182,6 +182,7 @@ def test_cells_are_the_standalone_readers(opened):
 
 
 @pytest.mark.parametrize("light", ["spot", "directional"])
+@pytest.mark.slow
 def test_vpls_are_placed_by_what_the_camera_sees(opened, light):
     """And anew when it moves; the default, which is one click away, has discs and another η."""
     scene, view = colored_room(), web_view(light)

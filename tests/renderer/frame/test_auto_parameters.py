@@ -80,6 +80,7 @@ def test_a_still_takes_what_it_asks_for(runtime):
         np.testing.assert_array_equal(drawn_places(runtime, room_view("spot"), config), first)
 
 
+@pytest.mark.slow
 def test_an_eased_frame_moves_by_little(runtime):
     """The first frame is exact; then no step is larger than the bound, each goes the target's way, and the
     target is reached."""

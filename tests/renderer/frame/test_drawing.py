@@ -236,6 +236,7 @@ def test_few_frames_are_kept(gl_context):
     assert dropped() is None, "the frame that was used longest ago goes, without a garbage collection"
 
 
+@pytest.mark.slow
 def test_dropped_frames_give_their_memory_back(gl_context):
     """OpenGL objects that live after many set-ups are as many as after two."""
     runtime = Runtime(colored_room(), context=gl_context)

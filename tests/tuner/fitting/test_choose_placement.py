@@ -36,6 +36,7 @@ def test_discs_beat_points_in_a_corner(gl_context):
     assert all(view.drawn_with == CONFIG.with_parameters(chosen.parameters) for view in chosen.views)
 
 
+@pytest.mark.slow
 def test_a_start_that_is_best_keeps_its_views(gl_context):
     """Its own images are the reference: nothing is better."""
     runtime = Runtime(colored_room(), context=gl_context)

@@ -58,6 +58,7 @@ def test_the_result_is_never_worse_than_the_start(room):
     assert fit.descent.loss <= own[0].loss
 
 
+@pytest.mark.slow
 def test_nothing_lit_is_a_status(gl_context):
     runtime = Runtime(colored_room(), context=gl_context)
     coarse = replace(FEW, quality=Quality(rsm_resolution=64))

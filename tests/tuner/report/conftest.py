@@ -18,7 +18,7 @@ def fitted_folder(tmp_path_factory) -> Path:
     from vpltune.tuner.scene_fit.fit_scene import FitOptions, fit_scene
 
     folder = tmp_path_factory.mktemp("report") / "fit"
-    start = TunedConfig(ArtistParameters(vpl_count=64))
+    start = TunedConfig(ArtistParameters(vpl_count=257))
     options = FitOptions(start=start, views=1, size=(64, 48), command="vpltune fit box.glb -o 'my out'")
     fit_scene(SCENE, folder, options, lambda stage, share: None)
     return folder

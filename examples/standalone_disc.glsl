@@ -35,7 +35,8 @@ float disc_form(vec3 d, vec3 n, vec3 m, float radius) {
     vec3 vector = (middle + height * m) * (height / (axial.x + dd + rr)) - m * axial.y;
     // Close to the disc, it is nearly a half-space.
     float facing_form = 2.0 * radius * radius * uncut.y / uncut.x;
-    float least = 0.5 * (1.0 - between) * pow(facing_form, 4.0) / (radius * radius);
+    float above = clamp(2.0 * dot(n, d) / (slope * radius), 0.0, 1.0);
+    float least = above * 0.5 * (1.0 - between) * pow(facing_form, 4.0) / (radius * radius);
     return max(dot(n, vector) * 2.0 * part.x / axial.x, least) * fade;
 }
 #endif

@@ -27,7 +27,8 @@ def disc_form(position, normal, vpls: Vpls, alpha: float, scene_length: float) -
     height = -dot(vpl_normal, to_vpl)
     between = dot(normal, vpl_normal)
     slope = np.sqrt(np.maximum(1.0 - between**2, 1e-12))
-    share, offset = disc_past_chord(dot(normal, to_vpl) / (slope * radius))
+    above = dot(normal, to_vpl) / (slope * radius)
+    share, offset = disc_past_chord(above)
     fade = np.minimum(2.0 * height / FADE_HEIGHT - 1.0, 1.0)
     lit = (fade > 0.0) & (share >= LEAST_PART)
     height, share = np.maximum(height, 0.0), np.maximum(share, LEAST_PART)
@@ -43,7 +44,7 @@ def disc_form(position, normal, vpls: Vpls, alpha: float, scene_length: float) -
     # Close to the disc, it is nearly a half-space.
     uncut_q, uncut_axial = disc_axial(dot(to_vpl, to_vpl), height, radius**2)
     facing_form = 2.0 * radius**2 * uncut_axial / uncut_q
-    least = 0.5 * (1.0 - between) * facing_form**4 / radius**2
+    least = np.clip(2.0 * above, 0.0, 1.0) * 0.5 * (1.0 - between) * facing_form**4 / radius**2
     received = np.maximum(dot(normal, vector) * 2.0 * share / q, least) * fade
     return np.where(lit, received, 0.0) / scene_length**2
 

@@ -14,7 +14,8 @@
 // Close to the disc, that replacement dips below the horizon, and its two sides cancel. There the emitter is nearly a
 // half-space, whose form factor is (1 - m·n)/2. So E is at least Φ/(πl²) (1 - m·n)/2 F⁴, F being the form factor of the
 // uncut disc for a receiver that faces it. The exponent has the least error against numerical integrals
-// (tests/physics/test_vpl_disc.py).
+// (tests/physics/test_vpl_disc.py). Only where the centre is well above the horizon: a disc whose centre is behind a thin
+// wall must not shine in front of it.
 
 // A chord cuts a unit disc. `t` is the centre's signed distance from the chord, positive where the centre is on the
 // kept side. Returns x, the kept part's share of the area, and y, the distance of its centroid from the centre.
@@ -48,7 +49,8 @@ vec3 disc_vector(vec3 to_vpl, vec3 normal, vec3 vpl_normal, float radius) {
     float between = dot(normal, vpl_normal);
     // Sine of the angle between the two planes. The bound avoids a division by 0 for parallel planes.
     float slope = sqrt(max(1.0 - between * between, 1e-12));
-    vec2 part = disc_past_chord(dot(normal, to_vpl) / (slope * radius));
+    float above = dot(normal, to_vpl) / (slope * radius);
+    vec2 part = disc_past_chord(above);
     float fade = min(2.0 * height / DISC_FADE_HEIGHT - 1.0, 1.0);
     if (!(fade > 0.0) || part.x < DISC_LEAST_PART) {
         return vec3(0.0);
@@ -62,7 +64,7 @@ vec3 disc_vector(vec3 to_vpl, vec3 normal, vec3 vpl_normal, float radius) {
     vec2 uncut = disc_axial(dot(to_vpl, to_vpl), height, radius * radius);
     float facing_form = 2.0 * radius * radius * uncut.y / uncut.x;
     float squared_form = facing_form * facing_form;
-    float least = 0.5 * (1.0 - between) * squared_form * squared_form / (radius * radius);
+    float least = clamp(2.0 * above, 0.0, 1.0) * 0.5 * (1.0 - between) * squared_form * squared_form / (radius * radius);
     return (vector + normal * max(least - dot(normal, vector), 0.0)) * fade;
 }
 

@@ -150,7 +150,11 @@ float joined_overlap(MapTexel own, vec2 place, int map_start, vec3 receiver, vec
     for (int i = 1; i < 4; ++i) {
         ivec2 around = ivec2((i & 1) != 0 ? beside.x : inside.x, (i & 2) != 0 ? beside.y : inside.y);
         bool on_map = all(greaterThanEqual(around, ivec2(0))) && all(lessThan(around, ivec2(VISIBILITY_FINEST)));
-        met[i] = on_map ? map_texel(around, map_start).met : own.met;
+        // WebGL knows no conditional expression of structures.
+        met[i] = own.met;
+        if (on_map) {
+            met[i] = map_texel(around, map_start).met;
+        }
     }
     float overlap = -1.0;
     for (int i = 0; i < 4; ++i) {

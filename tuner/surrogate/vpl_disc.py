@@ -65,7 +65,8 @@ def disc_form(
         radius: Radius of the disc, at least `LEAST_RADIUS`.
     """
     slope = jnp.sqrt(jnp.maximum(1.0 - between**2, 1e-12))
-    share, offset = disc_past_chord(facing / (slope * radius))
+    above = facing / (slope * radius)
+    share, offset = disc_past_chord(above)
     fade = jnp.minimum(2.0 * height / FADE_HEIGHT - 1.0, 1.0)
     lit = (fade > 0.0) & (share >= LEAST_PART)
     height = jnp.maximum(height, 0.0)
@@ -80,5 +81,5 @@ def disc_form(
     received = (facing + shift * slope + height * between) * lateral - between * axial
     uncut_q, uncut_axial = disc_axial(squared, height, radius**2)
     facing_form = 2.0 * radius**2 * uncut_axial / uncut_q
-    least = 0.5 * (1.0 - between) * facing_form**4 / radius**2
+    least = jnp.clip(2.0 * above, 0.0, 1.0) * 0.5 * (1.0 - between) * facing_form**4 / radius**2
     return jnp.where(lit, jnp.maximum(received * (2.0 * share / q), least) * fade, 0.0)

@@ -75,7 +75,8 @@ def test_generated_scenes_lose_nothing(gl_context, monkeypatch, number):
     maps, complete = pruned.visibility_maps, whole.visibility_maps
     both = (maps.block < 0) & (complete.block < 0)
     nothing = maps.distance.max()
-    same = (maps.texels == complete.texels).all(-1)
+    # The lowest bits of a distance mark corners with neighbours, which may not have been cast.
+    same = np.isclose(maps.distance, complete.distance, rtol=2e-6) & (maps.normal == complete.normal).all(-1)
     assert (same | (maps.distance == nothing))[both].all()
     assert (complete.block >= 0)[maps.block >= 0].all()
     assert same.mean() < 0.9

@@ -33,7 +33,7 @@ def irradiances(runtime: Runtime, view: View, config: TunedConfig, rotations: in
 def test_the_mean_over_rotations_is_the_same_light(room, light, density_importance):
     """48 rotations of 256 VPLs give the image of 32,768: mean and middle pixel within 1.5 %.
 
-    With η = 1 a twentieth of the VPLs is drawn by flux alone, and what they find in the corner is left to chance.
+    With η = 1 a twentieth of the VPLs is drawn by flux alone: what they find in the corner is left to chance.
 
     α is small, so that footprints, which depend on density, take little light away; pixels in corners, where
     1/d² then runs free, are noisy (RMS over all of them 2 to 16 %), so the middle one is looked at.

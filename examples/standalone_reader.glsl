@@ -97,7 +97,7 @@ layout(rgba32f, binding = 0) writeonly uniform image2D radiance;
 // Percentage-closer filtering of the four nearest texels. The bias, 1.5 and 0.5 texels, is the runtime's.
 float shadow(int light, vec3 position, vec3 normal, vec3 towards) {
     int chosen = 0;
-    float most = -2.0;
+    float most = -3.0;  // below what any face gives
     for (int i = 0; i < faces.length(); ++i) {
         if (int(faces[i].extent_light.z) != light) continue;
         vec3 place = (faces[i].to_face * vec4(position, 1.0)).xyz;

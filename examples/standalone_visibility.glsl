@@ -1,7 +1,8 @@
 // The visibility maps of standalone_reader.py: a small map of the surfaces that each VPL's hemisphere sees.
 // CASTING sends one ray through each texel, against every triangle, which is short but slow. Where the surface in one
 // texel hides that in its neighbour, MARKING replaces the texel by a block of finer ones, and REFINING casts those. Where
-// two texels meet in a concave corner, MARKING says so in the last bits of the distance. LIGHTING looks up the map in the direction of a pixel. The program defines the config's parameters, scene_length,
+// two texels meet in a concave corner, MARKING says so in the last bits of the distance. LIGHTING looks up the map in
+// the direction of a pixel. The program defines the config's parameters, scene_length,
 // map_size (texels along the side, or 0), map_refinement (texels along the side of a block) and map_blocks, the room
 // for blocks.
 

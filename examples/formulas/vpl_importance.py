@@ -9,7 +9,7 @@ SPREAD = 16.0
 DARK_SHARE = 0.01
 LEAST_IMPORTANCE = 0.05
 LEAST_COSINE = 1e-3
-LEAST_COSINES = 0.01
+LEAST_COSINE_PRODUCT = 0.01
 SAMPLES = 4
 """Texels looked at along the side of a cell."""
 
@@ -46,7 +46,7 @@ def cell_form(position, normal, cells: dict) -> np.ndarray:
     least = LEAST_COSINE * np.sqrt(squared)
     cosine_receiver = np.maximum(dot(normal[:, None], to_cell) - least, 0.0)
     cosine_cell = np.maximum(-dot(cells["normal"].reshape(-1, 3)[None], to_cell) - least, 0.0)
-    cosines = np.maximum(cosine_receiver * cosine_cell / squared, LEAST_COSINES)
+    cosines = np.maximum(cosine_receiver * cosine_cell / squared, LEAST_COSINE_PRODUCT)
     form = cosines / (np.pi * squared + SPREAD * cells["area"].reshape(-1)[None])
     return np.where(cells["flux"].reshape(-1) > 0.0, form, 0.0)
 

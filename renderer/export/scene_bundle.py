@@ -79,7 +79,7 @@ def scene_bundle(scene: Scene, view: View, config: TunedConfig) -> SceneBundle:
             "exposure_key": EXPOSURE_KEY,
         },
         "bounds": bounds.tolist(),
-        "diagonal": float(np.linalg.norm(bounds[1] - bounds[0])),
+        "diagonal": length,
         "lights": [light_to_json(light) for light in view.lights],
         "rsm": {
             "resolution": resolution,

@@ -1,7 +1,10 @@
-"""The sRGB transfer curve (IEC 61966-2-1:1999)."""
+"""The sRGB transfer curve (IEC 61966-2-1:1999), and luminance."""
 
 import numpy as np
 from jaxtyping import Float
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+"""Luminance of linear sRGB primaries (ITU-R BT.709)."""
 
 
 def srgb_from_linear(linear: Float[np.ndarray, "*shape"]) -> Float[np.ndarray, "*shape"]:

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, Int32, UInt32
 
 from vpltune.renderer.frame.frame import Frame
-from vpltune.renderer.frame.visibility_map_layout import TEXEL_BYTES, VISIBILITY_CORNER_BITS
+from vpltune.renderer.frame.visibility_map_layout import TEXEL_BYTES, VISIBILITY_CORNER_MASK
 from vpltune.renderer.gpu.resources import HOST_TEXTURE, Access, Resources
 from vpltune.renderer.scene.views import View, ray_directions_world
 
@@ -135,7 +135,7 @@ def _visibility_maps(frame: Frame) -> VisibilityMaps | None:
     details = details.reshape(-1, layout.refinement, layout.refinement, 2)
     # Blocks lie in the order in which the GPU came to them, which is another one each time.
     details = details[texels[refined][:, 1]]
-    corner = (texels[..., 0] & np.uint32(VISIBILITY_CORNER_BITS)).astype(np.int32)
+    corner = (texels[..., 0] & np.uint32(VISIBILITY_CORNER_MASK)).astype(np.int32)
     texels = np.where(refined[..., None], np.uint32(0), texels)
     block = np.full(refined.shape, -1, np.int32)
     block[refined] = np.arange(len(details), dtype=np.int32)

@@ -74,7 +74,7 @@ class FrameSetup:
     adaptation_frames: float
 
     @classmethod
-    def of(cls, view: View, config: TunedConfig, nested_faces: int = 0) -> "FrameSetup":
+    def of(cls, view: View, config: TunedConfig, nested_faces: int) -> "FrameSetup":
         """The set-up that draws `view` with `config`, in a scene whose suns have so many nested faces."""
         count = config.parameters.vpl_count
         return cls(

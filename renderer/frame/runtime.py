@@ -274,15 +274,10 @@ class Runtime:
         Raises:
             ValueError: there are no configs, they draw VPLs differently, or one has a prior.
         """
-        if (
-            len(
-                {
-                    (placement(each.parameters), FrameSetup.of(view, each, self._nested_faces))
-                    for each in configs
-                }
-            )
-            != 1
-        ):
+        drawn_as = {
+            (placement(each.parameters), FrameSetup.of(view, each, self._nested_faces)) for each in configs
+        }
+        if len(drawn_as) != 1:
             raise ValueError("capture_variants: configs must be one or more with one placement of the VPLs")
         if any(each.auto is not None for each in configs):
             raise ValueError("capture_variants: configs must have no prior")

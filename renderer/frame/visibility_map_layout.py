@@ -10,7 +10,7 @@ VISIBILITY_LIFT = 0.01
 """Rays start, and distances count, from a point lifted off the VPL's surface by this many footprints. A VPL
 behind its own surface would see nothing else, and the RSM is off: by 1/256 of a texel, in which a rasteriser
 counts places, and by the rounding of its depth. A footprint is tens of texels."""
-VISIBILITY_CORNER_BITS = 7
+VISIBILITY_CORNER_MASK = 7
 """Bits at the end of a map's distances that hold the corner mark (shaders/common/vpl_visibility.glsl). They
 change a distance by 1e-6 of itself."""
 VISIBILITY_NEAREST_VERTEX = 1
@@ -57,7 +57,7 @@ class VisibilityMapLayout:
             "VISIBILITY_MAP_SIZE": self.size,
             "VISIBILITY_MAP_REFINEMENT": self.refinement,
             "VISIBILITY_LIFT": VISIBILITY_LIFT,
-            "VISIBILITY_CORNER_BITS": f"{VISIBILITY_CORNER_BITS}u",
+            "VISIBILITY_CORNER_MASK": f"{VISIBILITY_CORNER_MASK}u",
             "VISIBILITY_NEAREST_VERTEX": f"{VISIBILITY_NEAREST_VERTEX}u",
             "VISIBILITY_FIRST_VERTEX": f"{VISIBILITY_FIRST_VERTEX}u",
             "VISIBILITY_ROUNDING": VISIBILITY_ROUNDING,

@@ -18,7 +18,11 @@ uniform int vpl_count;
 
 void main() {
     int index = int(gl_GlobalInvocationID.x);
-    VirtualPointLight own = vpl_samples[min(index, sample_count - 1)];
+    // A dark sample belongs to no VPL.
+    if (index >= sample_count || !(vpl_samples[index].normal_area.w > 0.0)) {
+        return;
+    }
+    VirtualPointLight own = vpl_samples[index];
     float length_squared = scene_length * scene_length;
     float nearest = 1e30;
     int owner = -1;
@@ -31,8 +35,7 @@ void main() {
             owner = i;
         }
     }
-    // A dark sample belongs to no VPL.
-    if (index < sample_count && own.normal_area.w > 0.0 && owner >= 0) {
+    if (owner >= 0) {
         atomicOr(vpl_members[owner * member_words() + index / 32], 1u << uint(index % 32));
     }
 }

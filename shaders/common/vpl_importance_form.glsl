@@ -14,14 +14,13 @@ struct ImportanceReceiver {
     vec4 normal_irradiance;  // unit normal; irradiance from all cells without visibility, in an arbitrary unit
 };
 
-// A choice. Below this cosine, one surface lies in the plane of the other, and rounding decides on which side. Without
-// the bound, such cells would come and go in the mean importance.
+// A choice. Below this cosine, one surface lies in the plane of the other, and rounding decides on which side.
 const float LEAST_COSINE = 1e-3;
 
 // A choice: share of what a cell would give square on that it counts for at least. Surfaces that face away but lie near,
 // such as a roof over a lit floor, are then not drawn as sparsely, and with as much flux, as ground far away. A clustered
 // disc of the floor may take their samples.
-const float LEAST_COSINES = 0.01;
+const float LEAST_COSINE_PRODUCT = 0.01;
 
 // Irradiance at a receiver for each watt of the cell. The light is spread over IMPORTANCE_SPREAD times the cell's area
 // and so stays finite close to the cell.
@@ -30,7 +29,8 @@ float cell_form(vec3 position_world, vec3 normal_world, ImportanceCell cell) {
     float distance_squared = max(dot(to_cell, to_cell), 1e-30);
     float least = LEAST_COSINE * sqrt(distance_squared);
     float cosines = max(dot(normal_world, to_cell) - least, 0.0) * max(-dot(cell.normal_area.xyz, to_cell) - least, 0.0);
-    return max(cosines / distance_squared, LEAST_COSINES) / (PI * distance_squared + IMPORTANCE_SPREAD * cell.normal_area.w);
+    return max(cosines / distance_squared, LEAST_COSINE_PRODUCT)
+        / (PI * distance_squared + IMPORTANCE_SPREAD * cell.normal_area.w);
 }
 
 // Irradiance at a receiver from a cell; 0 from a dark cell.

@@ -60,7 +60,7 @@ vec3 visibility_axis(ivec2 texel, int size) {
 // The entry for a ray's hit, without a corner mark.
 uvec2 visibility_texel(float distance_in_l, vec3 normal_vpl) {
     return uvec2(
-        floatBitsToUint(distance_in_l) & ~VISIBILITY_CORNER_BITS, packUnorm2x16(octahedral_encode(normal_vpl)));
+        floatBitsToUint(distance_in_l) & ~VISIBILITY_CORNER_MASK, packUnorm2x16(octahedral_encode(normal_vpl)));
 }
 
 // The entry that points to a block of finer rays. Any corner in it is looked for.
@@ -89,7 +89,7 @@ MapTexel map_texel(ivec2 place, int map_start) {
     const int refinement = VISIBILITY_MAP_REFINEMENT;
     ivec2 texel = place / refinement;
     uvec2 entry = VISIBILITY_MAP_ENTRY(map_start + texel.y * VISIBILITY_MAP_SIZE + texel.x);
-    uint corner = entry.x & VISIBILITY_CORNER_BITS;
+    uint corner = entry.x & VISIBILITY_CORNER_MASK;
 #if VISIBILITY_MAP_REFINEMENT > 1
     if ((entry.x & VISIBILITY_BLOCK_BIT) != 0u) {
         entry = VISIBILITY_DETAIL_ENTRY(entry.y, (place % refinement));

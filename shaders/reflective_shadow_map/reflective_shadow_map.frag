@@ -1,8 +1,9 @@
 // Reflective shadow map: the surfaces that a light face sees, as geometric normal and reflectance.
 //
 // Reads: the outputs of reflective_shadow_map.vert, the base colour texture, lights.
-// Writes: octahedral normal; reflectance = albedo · cone · cosine ratio, 0 where a finer face carries the flux. The reader multiplies by the light's intensity
-// (common/rsm.glsl), so both targets hold plain ratios, and half floats suffice at every scale of the scene.
+// Writes: octahedral normal; reflectance = albedo · cone · cosine ratio, 0 where a finer face carries the flux. The
+// reader multiplies by the light's intensity (common/rsm.glsl), so both targets hold plain ratios, and half floats
+// suffice at every scale of the scene.
 // Python: renderer/frame/passes/reflective_shadow_map.py.
 #include "common/lights.glsl"
 #include "common/octahedral.glsl"

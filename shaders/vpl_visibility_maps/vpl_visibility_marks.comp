@@ -1,9 +1,9 @@
 // Visibility maps, part 1: marks the texels that a visible receiver may look up. Boxes around the receivers are projected
 // into each VPL's map. One workgroup for each VPL.
 //
-// Reads: VPLs, scene length, receiver bounds. Writes: `visibility_marks`.
-// Constants: DISC_LARGEST_FALLOFF, the greatest α. Python: renderer/frame/passes/vpl_visibility_maps.py.
-#include "common/scene_length.glsl"
+// Reads: VPLs, receiver bounds. Writes: `visibility_marks`.
+// Constants: DISC_LARGEST_FALLOFF, the greatest α of renderer/config/artist_parameters.py.
+// Python: renderer/frame/passes/vpl_visibility_maps.py.
 #include "common/virtual_point_lights.glsl"
 #include "common/vpl_visibility.glsl"
 #include "common/receiver_bounds.glsl"
@@ -15,9 +15,6 @@ layout(local_size_x = 64) in;
 layout(std430, binding = VIRTUAL_POINT_LIGHTS_BINDING) readonly buffer VirtualPointLights {
     VirtualPointLight virtual_point_lights[];
 };
-
-// A choice, as a share of a distance: far above the rounding of what the lookup computes, and 0.002 texels of a map.
-const float ROUNDING = 1e-4;
 
 shared uint marks[2 * VISIBILITY_MAP_SIZE];  // two words for each row
 
@@ -43,7 +40,7 @@ void mark(ReceiverBounds box, vec3 origin, mat3 axes, float radius) {
     vec3 low = box.low.xyz - origin;
     vec3 high = box.high.xyz - origin;
     vec3 farthest = max(abs(low), abs(high));
-    float margin = ROUNDING * (farthest.x + farthest.y + farthest.z);
+    float margin = VISIBILITY_ROUNDING * (farthest.x + farthest.y + farthest.z);
     // The least dot product of offset and normal: where it is positive, all face away from the VPL's middle, and beyond
     // `radius` from all of a disc.
     vec3 facing = min(

@@ -9,6 +9,7 @@ from jaxtyping import Float32, UInt8
 from PIL import Image, ImageDraw, ImageFont
 
 from vpltune.renderer.files.image_file import write_png
+from vpltune.renderer.files.srgb import LUMINANCE
 from vpltune.renderer.frame.passes.tone_mapping import EXPOSURE_KEY
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.evaluation.evaluate import VARIANTS, EvaluatedView
@@ -22,8 +23,6 @@ _MARGIN = 8
 """Pixels around a panel. A choice."""
 _CAPTION = 22
 """Height of the caption above a panel, in pixels. A choice that fits a font of 14."""
-# Luminance of linear sRGB: IEC 61966-2-1.
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 Irradiance = Float32[np.ndarray, "height width 3"]
 Image8 = UInt8[np.ndarray, "height width 3"]
@@ -96,7 +95,7 @@ def _rows(runtime: Runtime, evaluated: EvaluatedView, shown_for: str) -> list[Pi
 
 def _exposure(radiance: Irradiance, view: CapturedView) -> float:
     """The exposure that brings the mean luminance to `EXPOSURE_KEY`; 1 for a black image."""
-    level = float((radiance[view.valid] @ _LUMINANCE).mean()) if view.valid.any() else 0.0
+    level = float((radiance[view.valid] @ LUMINANCE.astype(np.float32)).mean()) if view.valid.any() else 0.0
     return EXPOSURE_KEY / level if level > 0.0 else 1.0
 
 

@@ -5,9 +5,6 @@ from jaxtyping import Float, UInt8
 
 from vpltune.renderer.files.srgb import srgb_from_linear
 
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-"""Luminance of linear sRGB primaries (ITU-R BT.709)."""
-
 
 def display_image(
     linear: Float[np.ndarray, "height width 3"], exposure: float

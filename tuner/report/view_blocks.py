@@ -12,7 +12,8 @@ from PIL import Image
 from vpltune.renderer.frame.passes.tone_mapping import EXPOSURE_KEY
 from vpltune.tuner.evaluation.view_images import VARIANTS, ViewImages
 from vpltune.tuner.metrics.error_maps import DIVERGING, MAGMA, map_png, signed_error
-from vpltune.tuner.metrics.tone_curve import LUMINANCE, display_image
+from vpltune.renderer.files.srgb import LUMINANCE
+from vpltune.tuner.metrics.tone_curve import display_image
 from vpltune.tuner.metrics.view_metrics import hdr_flip_map
 
 SHOWN = ("reference", *VARIANTS)

@@ -155,10 +155,11 @@ def surface_overlap(
 ) -> Float[Array, "receivers vpls"]:
     """Overlap of each receiver with the surface that each VPL sees towards it, as a share of the distance.
 
-    The surface is the one that the map's nearest ray hit. The overlap is the smaller of two distances: from
-    the end of that ray to the receiver's tangent plane (receiver plane depth bias, Isidoro 2006), and from
-    the receiver to the surface's tangent plane. It is negative if nothing is in between, and -1 if the pair
-    exchanges no light anyway.
+    For a receiver that faces the VPL's middle it is the lesser of two heights: of the hit above the
+    receiver's tangent plane (receiver plane depth bias, Isidoro 2006), and of the receiver behind the hit's.
+    Otherwise it is that of the disc's rim (`rim_overlap` in GLSL). At a corner mark, the planes of three
+    texels around count too (`joined_overlap`). It is negative if nothing is in between, and -1 below the
+    VPL's horizon.
 
     Args:
         receivers: Receivers, in units of L.

@@ -401,7 +401,7 @@ class Frame {
     if (this.visibility) this.castVisibility(vpl_count);
   }
 
-  // Importance of each cell of the RSM: how much the camera would miss without its light. The exponent η comes later.
+  // Importance of each cell of the RSM: how much the camera would miss without its light. The share η comes later.
   measureImportance(camera) {
     const { vpl_importance_cells, vpl_importance_receivers, vpl_importance, vpl_importance_mean } = this.programs;
     fill(this.importanceCells, vpl_importance_cells, this.rsmValues);

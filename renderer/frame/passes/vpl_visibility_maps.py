@@ -44,7 +44,7 @@ class VplVisibilityMapsPass(FramePass):
             resources,
             "vpl_visibility_maps/vpl_visibility_marks",
             {**layout.defines, "DISC_LARGEST_FALLOFF": parameter_spec("falloff_footprint").high},
-            reads=("frame_statistics", "virtual_point_lights", "receiver_bounds", *MAP_READS),
+            reads=("virtual_point_lights", "receiver_bounds", *MAP_READS),
             writes=("visibility_marks",),
         )
         self._maps = ComputeProgram(
@@ -80,7 +80,8 @@ class VplVisibilityMapsPass(FramePass):
         uniforms = {"longest": inputs.scene_diagonal, "vpl_count": self._vpl_count}
         self._marks.dispatch(*groups, vpl_count=self._vpl_count)
         self._maps.dispatch(*groups, **uniforms)
-        self._resources.write("visibility_edges", EMPTY_DISPATCH)
+        if self._refines:
+            self._resources.write("visibility_edges", EMPTY_DISPATCH)
         self._edges.dispatch(*groups, **uniforms)
         if self._refines:
             self._details.dispatch_indirect("visibility_edges", longest=inputs.scene_diagonal)

@@ -25,7 +25,7 @@ from vpltune.renderer.scene.placement.free_places import (
 )
 from vpltune.renderer.scene.placement.free_space import FreeSpace, sphere_directions
 from vpltune.renderer.scene.placement.sight import front_facing, lit_fraction, seen_by
-from vpltune.renderer.scene.placement.subject import detail_bounds, subject_space
+from vpltune.renderer.scene.placement.subject import detail_bounds, subject_pieces, subject_space
 from vpltune.renderer.scene.scene import Camera, Light, Scene, look_at
 
 # A choice: vertical field of view inside a room, radians.
@@ -221,8 +221,7 @@ def _cameras_outside(space: FreeSpace) -> list[tuple[float, Camera]]:
     """Views from all around that frame the whole subject."""
     low, high = detail_bounds(space)
     target = 0.5 * (low + high)
-    pieces = np.argwhere(space.detail if space.detail.any() else space.occupied) + 0.5
-    pieces = pieces[((pieces >= low) & (pieces <= high)).all(axis=1)]
+    pieces = subject_pieces(space)
     near = NEAR_OUTSIDE * float(np.linalg.norm(space.shape))
     cameras = []
     for elevation in np.radians(ELEVATIONS):

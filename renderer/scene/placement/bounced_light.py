@@ -5,6 +5,7 @@ import math
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
+from vpltune.renderer.files.srgb import LUMINANCE
 from vpltune.renderer.scene.placement.free_space import FreeSpace, march_rays
 from vpltune.renderer.scene.placement.sight import SAME_PLACE, Sight, cone_directions, lit, march_from
 from vpltune.renderer.scene.scene import Light
@@ -17,8 +18,6 @@ VISIBLE_RADIANCE = 0.03
 LEAVE_SURFACE = 1.5
 # A choice: weights of visible and of coloured light if there is none, so that no score is zero.
 LEAST_VISIBLE, LEAST_COLORED = 0.1, 0.2
-# Rec. 709 luminance of linear red, green and blue.
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 def bounce_score(space: FreeSpace, sight: Sight, eye: Float64[np.ndarray, "3"], light: Light) -> float:

@@ -9,7 +9,7 @@ from vector_file import PI, VECTORS, boxes, buffer_of, inputs_of, light_of, vpl_
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.frame.capture import octahedral_decode
 from vpltune.renderer.frame.passes.vpl_visibility_maps import VplVisibilityMapsPass
-from vpltune.renderer.frame.visibility_map_layout import VISIBILITY_CORNER_BITS, VisibilityMapLayout
+from vpltune.renderer.frame.visibility_map_layout import VISIBILITY_CORNER_MASK, VisibilityMapLayout
 from vpltune.renderer.gpu.ray_hierarchy import RayHierarchy
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights
@@ -190,7 +190,7 @@ def test_maps_are_cast_like_this(gl_context):
     texels = np.frombuffer(resources.read("visibility_maps"), np.uint32).reshape(SIZE, SIZE, 2)
     refined = texels[..., 0] >> 31 != 0
     np.testing.assert_array_equal(refined, MAP["block"] >= 0)
-    np.testing.assert_array_equal(texels[..., 0] & VISIBILITY_CORNER_BITS, MAP["corner"])
+    np.testing.assert_array_equal(texels[..., 0] & VISIBILITY_CORNER_MASK, MAP["corner"])
     assert_met(texels[~refined], MAP["end"][~refined], MAP["normal"][~refined])
     # Blocks lie in the order in which invocations came to them.
     details = resources.read("visibility_details")

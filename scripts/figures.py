@@ -28,13 +28,12 @@ from benchmarks.harness.figures import (
     row_values,
 )
 from benchmarks.harness.page_examples import example_values, examples
-from benchmarks.tuning.fit_never_loses import program_digest
+from benchmarks.harness.program_digest import DIGEST_LENGTH, program_digest
+from benchmarks.harness.scene_library import REPOSITORY
+from vpltune.renderer.files.atomic_file import write_text_whole
 
-REPOSITORY = Path(__file__).resolve().parents[1]
 COLUMNS = 120
 """Columns of the terminal that examples print for: the pages'."""
-DIGEST_LENGTH = 16
-"""Hexadecimal digits of a folder's name. A choice."""
 
 
 def main() -> int:
@@ -129,10 +128,8 @@ def _run(command: Command, path: Path, ties: Ties) -> None:
         values = markdown_values(printed[-1], command.keys)
     else:
         values = row_values(json.loads(printed[-1])["rows"])
-    # Written whole or not at all: what exists is not run again.
-    part = path.with_suffix(".part")
-    part.write_text(json.dumps(values), encoding="utf-8")
-    part.replace(path)
+    # What exists is not run again.
+    write_text_whole(path, json.dumps(values) + "\n")
 
 
 def _argv(line: str) -> list[str]:
@@ -151,7 +148,7 @@ def _list(ties: Ties, commands: dict[str, Command]) -> None:
 
 
 def _digest() -> str:
-    digest = hashlib.sha256(program_digest().encode())
+    digest = hashlib.sha256(program_digest(Path(__file__)).encode())
     for path in sorted((REPOSITORY / "benchmarks").rglob("*.py")):
         digest.update(str(path.relative_to(REPOSITORY)).encode() + path.read_bytes())
     return digest.hexdigest()[:DIGEST_LENGTH]

@@ -4,25 +4,13 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Float64
 
 from vpltune.renderer.scene.scene import Instance, Material, Mesh, Scene
+from vpltune.tuner.prior.scene_generator import CUBE_SIDES, parallelograms
 
 WHITE, RED, GREEN, BLUE, YELLOW = range(5)
 # A choice: plain base colours, of which four bleed.
 COLORS = ((0.7, 0.7, 0.7), (0.7, 0.1, 0.08), (0.1, 0.6, 0.15), (0.12, 0.2, 0.7), (0.75, 0.55, 0.1))
-# The sides of the cube [-1, 1]³ as parallelograms (origin, u, v); u × v points outwards.
-_SIDES = np.array(
-    [
-        [[1, -1, -1], [0, 2, 0], [0, 0, 2]],
-        [[-1, -1, -1], [0, 0, 2], [0, 2, 0]],
-        [[-1, 1, -1], [0, 0, 2], [2, 0, 0]],
-        [[-1, -1, -1], [2, 0, 0], [0, 0, 2]],
-        [[-1, -1, 1], [2, 0, 0], [0, 2, 0]],
-        [[-1, -1, -1], [0, 2, 0], [2, 0, 0]],
-    ],
-    np.float64,
-)
 Box = tuple[tuple[float, float, float], tuple[float, float, float], int]
 
 
@@ -37,36 +25,19 @@ def hard_scenes() -> dict[str, Callable[[], Scene]]:
         "two-rooms-of-two-sizes": _two_rooms,
         "table-top": _table_top,
         "thin-pieces": _thin_pieces,
-        "room-without-ceiling": lambda: _scene("room-without-ceiling", _furnished((0.0, 0.0, 0.0), 5)),
+        "room-without-ceiling": lambda: _scene(
+            "room-without-ceiling", _furnished((0.0, 0.0, 0.0), ceiling=False)
+        ),
         "open-pavilion": _pavilion,
     }
-
-
-def _mesh(name: str, quads: Float64[np.ndarray, "quads 3 3"], material: int) -> Mesh:
-    """A mesh of parallelograms (origin, u, v) with normals u × v."""
-    origin, u, v = quads[:, 0], quads[:, 1], quads[:, 2]
-    normals = np.cross(u, v)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    positions = np.stack([origin, origin + u, origin + u + v, origin + v], axis=1).reshape(-1, 3)
-    count = len(positions)
-    first = 4 * np.arange(len(quads))[:, None, None]
-    return Mesh(
-        name,
-        positions.astype(np.float32),
-        np.repeat(normals, 4, axis=0).astype(np.float32),
-        np.zeros((count, 2), np.float32),
-        np.ones((count, 3), np.float32),
-        (first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3).astype(np.int32),
-        material,
-    )
 
 
 def _box(low: tuple[float, float, float], high: tuple[float, float, float], material: int) -> Mesh:
     """A closed box that faces outwards."""
     center, half = 0.5 * (np.array(high) + low), 0.5 * (np.array(high) - low)
-    sides = _SIDES * half
+    sides = CUBE_SIDES * half
     sides[:, 0] += center
-    return _mesh("box", sides, material)
+    return parallelograms("box", sides, material)
 
 
 def _shell(
@@ -74,19 +45,17 @@ def _shell(
 ) -> list[Mesh]:
     """Walls that face inwards, in the order +x, −x, +y, −y, +z, −z; a side without a colour is left out."""
     center, half = 0.5 * (np.array(high) + low), 0.5 * (np.array(high) - low)
-    sides = _SIDES[:, [0, 2, 1]] * half
+    sides = CUBE_SIDES[:, [0, 2, 1]] * half
     sides[:, 0] += center
-    return [_mesh("wall", sides[[i]], color) for i, color in enumerate(colors) if color is not None]
+    return [parallelograms("wall", sides[[i]], color) for i, color in enumerate(colors) if color is not None]
 
 
-def _scene(name: str, meshes: list[Mesh], shift: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Scene:
-    """Each mesh placed once, moved by `shift`."""
-    to_world = np.eye(4)
-    to_world[:3, 3] = shift
+def _scene(name: str, meshes: list[Mesh]) -> Scene:
+    """Each mesh placed once, as it is."""
     return Scene(
         name,
         tuple(meshes),
-        tuple(Instance(mesh.name, index, to_world) for index, mesh in enumerate(meshes)),
+        tuple(Instance(mesh.name, index, np.eye(4)) for index, mesh in enumerate(meshes)),
         tuple(Material(f"m{i}", np.array(color, np.float32)) for i, color in enumerate(COLORS)),
     )
 
@@ -104,18 +73,20 @@ def _pieces(x: float, y: float, z: float) -> list[Mesh]:
     return [_box(tuple(move + low), tuple(move + high), color) for low, high, color in boxes]
 
 
-def _furnished(shift: tuple[float, float, float], sides: int = 6) -> list[Mesh]:
-    """A room of 5 × 2.6 × 4.4 with a red and a green wall; with five sides, it has no ceiling."""
+def _furnished(shift: tuple[float, float, float], *, ceiling: bool = True) -> list[Mesh]:
+    """A room of 5 × 2.6 × 4.4 with a red and a green wall."""
     x, y, z = shift
-    ceiling = WHITE if sides == 6 else None
+    above = WHITE if ceiling else None
     shell = _shell(
-        (x - 2.5, y, z - 2.2), (x + 2.5, y + 2.6, z + 2.2), (GREEN, RED, ceiling, WHITE, WHITE, WHITE)
+        (x - 2.5, y, z - 2.2), (x + 2.5, y + 2.6, z + 2.2), (GREEN, RED, above, WHITE, WHITE, WHITE)
     )
     return [*shell, *_pieces(x, y, z)]
 
 
 def _object_on_plane() -> Scene:
-    ground = _mesh("ground", np.array([[[-1e3, 0, -1e3], [0, 0, 2e3], [2e3, 0, 0]]], np.float64), WHITE)
+    ground = parallelograms(
+        "ground", np.array([[[-1e3, 0, -1e3], [0, 0, 2e3], [2e3, 0, 0]]], np.float64), WHITE
+    )
     return _scene("object-on-2-km-plane", [ground, *_pieces(310.0, 0.0, -420.0)])
 
 
@@ -132,7 +103,7 @@ def _room_in_terrain() -> Scene:
         for i in range(64)
         for j in range(64)
     ]
-    ground = _mesh("hills", np.concatenate(cells), GREEN)
+    ground = parallelograms("hills", np.concatenate(cells), GREEN)
     outside = _box((-2.7, -0.1, -2.4), (2.7, 2.8, 2.4), WHITE)
     return _scene("room-in-terrain", [ground, outside, *_furnished((0.0, 0.01, 0.0))])
 
@@ -173,9 +144,10 @@ def _thin_pieces() -> Scene:
     leaves = random.normal((0.0, 2.2, 0.0), 0.5, (400, 3))
     u, v = random.normal(0.0, 0.07, (2, 400, 3))
     quads = np.stack([leaves, u, v], axis=1)
-    lawn = _mesh("lawn", np.array([[[-4, 0, -4], [0, 0, 8], [8, 0, 0]]], np.float64), WHITE)
+    lawn = parallelograms("lawn", np.array([[[-4, 0, -4], [0, 0, 8], [8, 0, 0]]], np.float64), WHITE)
     return _scene(
-        "thin-pieces", [lawn, _mesh("leaves", quads, GREEN), _box((-0.1, 0.0, -0.1), (0.1, 2.0, 0.1), YELLOW)]
+        "thin-pieces",
+        [lawn, parallelograms("leaves", quads, GREEN), _box((-0.1, 0.0, -0.1), (0.1, 2.0, 0.1), YELLOW)],
     )
 
 

@@ -33,6 +33,11 @@ OUTSIDE_SCENES = {
 MITSUBA_SCENES = {"bitterli-living-room": "scene.xml", "bitterli-staircase2": "scene.xml"}
 """Folder and file of each third-party scene that must be imported."""
 
+KEPT_AWAY = ("bevy-depthoffieldexample", "cube2-steelribs", "kajiya-cornell-box", "playcanvas-house")
+"""Third-party scenes that choose nothing (docs/chosen_on.md)."""
+CHOOSING_SEED, REPORTED_SEED = 100, 20261129
+"""Seeds of generated scenes: of those that may choose something, and of those that choose nothing."""
+
 
 def own_scene(name: str) -> Path:
     """The file of the shipped scene `name`."""

@@ -14,7 +14,15 @@ from PIL import Image, ImageDraw
 
 from benchmarks.harness.hard_scenes import hard_scenes
 from benchmarks.harness.row import Row
-from benchmarks.harness.scene_library import MITSUBA_SCENES, REPOSITORY, present_scenes, scenes_folder
+from benchmarks.harness.scene_library import (
+    CHOOSING_SEED,
+    KEPT_AWAY,
+    MITSUBA_SCENES,
+    REPORTED_SEED,
+    REPOSITORY,
+    present_scenes,
+    scenes_folder,
+)
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
@@ -38,12 +46,12 @@ CONFIG = TunedConfig(
 """A choice: light enough for a software renderer. The figures do not depend on it."""
 GENERATED = 12
 """Scenes of the generator. A choice: two or three of each kind."""
-SEEDS = {"": 100, "held_out.": 20261129}
-"""Seed of the generated scenes that may choose something, and of those that choose nothing."""
-HELD_OUT = ("bevy-depthoffieldexample", "cube2-steelribs", "kajiya-cornell-box", "playcanvas-house")
-"""Third-party scenes that choose nothing (docs/chosen_on.md)."""
+SEEDS = {"": CHOOSING_SEED, "held_out.": REPORTED_SEED}
+"""Seeds of the generated scenes, by group."""
 BOUNDS = {"background": (0.0, 0.35), "largest_surface": (0.0, 0.6), "bounce_only": (0.3, 0.7)}
 """Bounds of a good view. Choices."""
+WANTED = 0.9
+"""Share of the scenes that should keep a bound. A choice."""
 COLUMNS = 4
 """Images side by side on the contact sheet."""
 SAMPLES = 64
@@ -69,8 +77,9 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 
 
 def shown(scene: Scene) -> tuple[UInt8[np.ndarray, "height width 3"], dict[str, float]]:
-    """The image of a scene's automatic view, and the figures named in `BOUNDS`, of which an object (not a
-    room) has no background.
+    """The image of a scene's automatic view, and the figures named in `BOUNDS`.
+
+    The background of an object, in place of a room, is named `open.background`.
     """
     bare = dataclasses.replace(scene, cameras=(), lights=())
     camera, _ = default_camera(bare)
@@ -113,7 +122,7 @@ def largest_surface(captured: CapturedFrame) -> float:
 def _scenes() -> Iterator[tuple[str, str, Callable[[], Scene]]]:
     """Name, group (a key of `SEEDS`) and maker of every scene."""
     for name, path in present_scenes().items():
-        yield name, "held_out." if name in HELD_OUT else "", lambda path=path: read_scene(path)
+        yield name, "held_out." if name in KEPT_AWAY else "", lambda path=path: read_scene(path)
     for name, file in MITSUBA_SCENES.items():
         path = scenes_folder() / name / file
         if path.is_file():
@@ -137,18 +146,22 @@ def _rows(group: str, scenes: list[dict[str, float]]) -> Iterator[Row]:
         low, high = BOUNDS[name.removeprefix("open.")]
         worst = max(values, key=lambda value: max(low - value, value - high))
         kept = float(np.mean([low <= value <= high for value in values]))
-        yield Row(f"{group}{name}.median", float(np.median(values)), "1", "upper bound", high)
-        yield Row(f"{group}{name}.worst", worst, "1", "upper bound", high)
-        yield Row(f"{group}{name}.scenes_within_bounds", kept, "1", "wanted", 0.9)
+        yield Row(
+            f"{group}{name}.median",
+            float(np.median(values)),
+            "1",
+            f"bounds {low:g} to {high:g}; the upper",
+            high,
+        )
+        yield Row(f"{group}{name}.worst", worst, "1", f"bounds {low:g} to {high:g}; the upper", high)
+        yield Row(f"{group}{name}.scenes_within_bounds", kept, "1", "wanted", WANTED)
 
 
 def _shares(figures: dict[str, float]) -> str:
-    background, *others = (
-        figures.get("background", figures.get("open.background", 0.0)),
-        figures["largest_surface"],
-        figures["bounce_only"],
-    )
-    return " ".join(f"{100.0 * share:.0f}" for share in (background, *others))
+    """Background, largest surface and bounce only, in percent."""
+    background = figures.get("background", figures.get("open.background", 0.0))
+    shares = (background, figures["largest_surface"], figures["bounce_only"])
+    return " ".join(f"{100.0 * share:.0f}" for share in shares)
 
 
 def _captioned(image: UInt8[np.ndarray, "height width 3"], text: str) -> UInt8[np.ndarray, "tall width 3"]:

@@ -27,7 +27,7 @@ import numpy as np
 
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import OWN_SCENES, scene_and_view
-from vpltune.renderer.config.tuned_config import read_config
+from vpltune.renderer.config.tuned_config import TunedConfig, read_config
 from vpltune.renderer.errors import MachineError
 from vpltune.renderer.frame.frame_timing import truthful_clock
 from vpltune.renderer.frame.runtime import Runtime
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from vpltune.tuner.reference.indirect_irradiance import IndirectIrradiance
 
 SEED = 2
-"""Seed of the generated scenes: the first that leaves 2 when divided by 3."""
+"""Seed of the generated scenes; those that leave 2 when divided by 3 choose nothing (docs/chosen_on.md)."""
 GENERATED = 2
 """Generated scenes beside the shipped ones. A choice: a room and a hall."""
 SIZE = (640, 360)
@@ -82,7 +82,7 @@ class EqualError:
     frame_relmse: float
     peer: str
     peer_seconds: float
-    """Interpolated at the count where the fitted relMSE is the frame's."""
+    """On the line through the timed runs, at the count where the fitted relMSE is the frame's."""
     checked: TracedRun
     """A run at about that count."""
 
@@ -202,7 +202,7 @@ def equal_error(scene: Path | int, effort: Effort) -> EqualError:
     frames: list[float] = []
     runs: dict[str, list[TracedRun]] = {name: [] for name in peers}
     for round_index in range(effort.rounds):
-        frames.append(frame_seconds(runtime, view))
+        frames.append(frame_seconds(runtime, view, config))
         for name, peer in peers.items():
             runs[name] += [traced_run(peer, samples, 1 + round_index, error) for samples in effort.samples]
     relmse = error(captured.indirect_irradiance)
@@ -213,11 +213,11 @@ def equal_error(scene: Path | int, effort: Effort) -> EqualError:
     return EqualError(min(frames), relmse, fastest, seconds, check)
 
 
-def frame_seconds(runtime: Runtime, view: View) -> float:
-    """Processor seconds of one frame of the default config, until it is finished."""
+def frame_seconds(runtime: Runtime, view: View, config: TunedConfig) -> float:
+    """Processor seconds of one frame, until it is finished."""
     runtime.context.finish()
     start = time.process_time()
-    runtime.draw(view, read_config("default"))
+    runtime.draw(view, config)
     runtime.context.finish()
     return time.process_time() - start
 
@@ -248,7 +248,8 @@ def count_and_seconds(runs: list[TracedRun], relmse: float) -> tuple[float, floa
         fastest[run.samples] = min(run.seconds, fastest.get(run.samples, run.seconds))
     line = np.polynomial.Polynomial.fit(list(fastest), list(fastest.values()), 1)
     count = max(1.0, float(np.exp((np.log(relmse) - offset) / slope)))
-    return count, float(line(count))
+    # Below the first count the line may cross 0.
+    return count, max(float(line(count)), fastest[min(fastest)] * min(1.0, count / min(fastest)))
 
 
 def relmse_without_noise(image: np.ndarray, half_a: np.ndarray, half_b: np.ndarray) -> float:

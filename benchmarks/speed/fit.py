@@ -29,7 +29,7 @@ WARM_LIMIT_S = 10.0
 RECEIVERS = 16_384
 """Receivers of the timed step: four times those that a fit takes from one view."""
 VPLS = 1_024
-"""VPLs of the timed step: the default count."""
+"""VPLs of the timed step: twice the default count."""
 REPEATS = 20
 """Runs of the reduced step, and a fifth as many of the pairwise one. A choice."""
 

@@ -25,7 +25,7 @@ PASS_CONFIG = TunedConfig()
 """The config of the pass rows: the default."""
 COUNTS = (64, 256, 1024, 4096)
 """VPLs of the frames. A choice."""
-PLACEMENTS = {"points": 0, "discs": 2}
+PLACEMENTS = {"points": 0, "discs": ArtistParameters().lloyd_iterations}
 """Lloyd iterations by the name of the placement: as many as the default has."""
 INTERLEAVES = {"full": 1, "interleaved": 4}
 """Pixels along the side of an interleaved block. A choice."""
@@ -73,8 +73,13 @@ class MeasuredScene:
         """The least milliseconds of each pass."""
         return pass_limits(drawn, config, self.scene.triangle_count(), self.rates)
 
-    def pass_milliseconds(self, drawn: DrawnFrame, frames: int) -> dict[str, float]:
-        """Milliseconds of each pass of a frame that was drawn before."""
+    def pass_milliseconds(self, drawn: DrawnFrame) -> dict[str, float]:
+        """Milliseconds of each pass of a frame that was drawn before, timed as often as there is room for."""
+        once = self._timed_passes(drawn, 1)
+        frames = self.timing.frames_for(sum(once.values()))
+        return once if frames == 1 else self._timed_passes(drawn, frames)
+
+    def _timed_passes(self, drawn: DrawnFrame, frames: int) -> dict[str, float]:
         clock = PassClock(self.context, self.rates.clock)
         for _ in range(frames):
             drawn.frame.draw(drawn.inputs, clock)
@@ -96,10 +101,7 @@ def pass_rows(measured: MeasuredScene) -> Iterator[Row]:
         config = PASS_CONFIG.seen_by(visibility)
         drawn = measured.runtime().draw(measured.sized(size), config)
         limits = measured.limits(drawn, config)
-        once = measured.pass_milliseconds(drawn, 1)
-        frames = measured.timing.frames_for(sum(once.values()))
-        milliseconds = once if frames == 1 else measured.pass_milliseconds(drawn, frames)
-        for name, value in milliseconds.items():
+        for name, value in measured.pass_milliseconds(drawn).items():
             yield Row(
                 f"pass.{PASS_SIZE}.{visibility}.{name}", value, "ms", measured.against_limit, limits[name]
             )

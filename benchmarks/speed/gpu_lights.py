@@ -46,9 +46,7 @@ def light_rows(measured: MeasuredScene) -> Iterator[Row]:
             runtime = measured.runtime(RuntimeOptions(light_path=path))
             lights = DynamicLights(moving_lights(measured, count).records)
             drawn = runtime.draw(view, PRE_PASS_CONFIG, lights=lights)
-            once = measured.pass_milliseconds(drawn, 1)["light_pre_pass"]
-            frames = measured.timing.frames_for(once)
-            taken = once if frames == 1 else measured.pass_milliseconds(drawn, frames)["light_pre_pass"]
+            taken = measured.pass_milliseconds(drawn)["light_pre_pass"]
             series.note(count, taken)
             if path == "tiles":
                 tiles_per_light = taken / count

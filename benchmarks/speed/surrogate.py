@@ -24,7 +24,7 @@ MATRIX = 2048
 RECEIVERS = 16_384
 """Receivers of the timed gather: four times those that a fit takes from one view."""
 VPLS = 1_024
-"""VPLs of the timed gather: the default count."""
+"""VPLs of the timed gather: twice the default count."""
 FORWARD_AIM = 0.25
 """Share of the matrix product's rate that the gather should reach. A choice."""
 REPEATS = 9

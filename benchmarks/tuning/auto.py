@@ -18,9 +18,8 @@ import moderngl
 import numpy as np
 
 from benchmarks.harness.row import Row
-from benchmarks.harness.scene_library import REPOSITORY, present_scenes
+from benchmarks.harness.scene_library import REPORTED_SEED, REPOSITORY, present_scenes
 from benchmarks.quality.carried_light import write_carried_light
-from benchmarks.tuning.fit_never_loses import SEED
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
 from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS
 from vpltune.renderer.config.tuned_config import TunedConfig, read_config
@@ -35,7 +34,7 @@ from vpltune.tuner.prior.prior_library import CONFIG, PriorScene, prior_referenc
 from vpltune.tuner.prior.prior_training import own_fits
 from vpltune.tuner.prior.scene_generator import generated_name, generated_scene
 from vpltune.tuner.prior.train_prior import collected_scenes, library_scene
-from vpltune.tuner.surrogate.captured_view import CapturedView
+from vpltune.tuner.surrogate.captured_view import capture_views
 from vpltune.tuner.surrogate.compiled_functions import keep_compiled_functions
 
 GENERATED = 20
@@ -67,7 +66,7 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
     """Medians over scenes, the shares that are better, the change with scale, and a row for each scene."""
     keep_compiled_functions()
     sources: dict[str, Callable[[], Scene]] = {
-        generated_name(number): partial(generated_scene, number, SEED) for number in range(GENERATED)
+        generated_name(number): partial(generated_scene, number, REPORTED_SEED) for number in range(GENERATED)
     }
     sources |= {name: partial(library_scene, path, name) for name, path in present_scenes().items()}
     scenes, _ = collected_scenes(sources, progress)
@@ -142,10 +141,7 @@ def _measured(context: moderngl.Context, captured: PriorScene, scene: Scene) -> 
     runtime = Runtime(scene, context=context)
     figures = {}
     for name, config in configs.items():
-        drawn = [
-            CapturedView(view, reference, runtime.capture(view, config, maps=False))
-            for view, reference in zip(views, references, strict=True)
-        ]
+        drawn = capture_views(runtime, config, views, references, maps=False)
         mean = mean_metrics([each.metrics(each.captured.indirect_irradiance) for each in drawn]).as_dict()
         figures[name] = {figure: mean[figure] for figure in FIGURES}
     return _Measured(scene.name, **figures)

@@ -2,7 +2,7 @@
 
 All images have visibility maps, and errors are means over fitted and held-out views. γ, η and the maps'
 parameters are fitted once for each scene, at `FITTED_COUNT` VPLs; the falloff is fitted at every count. The
-curves are written to out/density/curves.json and curves.png.
+curves are written to out/density/curves.json and curves.png. The default is that of version 0.1: points.
 
 `python -m benchmarks.tuning.density SCENE …` measures only the scenes that are named.
 """
@@ -76,11 +76,9 @@ LLOYD_ITERATIONS_TRIED = (1, 4, 16)
 """Lloyd iterations to compare with those of a fit. A choice."""
 LEAST_ERROR = 1e-9
 """Errors below this count as this much, so that their logarithms are finite."""
-_UNFITTED = {
-    "uniform": ArtistParameters(density_exponent=0.0),
-    "default": ArtistParameters(),
-    "discs": with_discs(ArtistParameters()),
-}
+_OLD = ArtistParameters(falloff_footprint=0.5, density_importance=0.0, lloyd_iterations=0)
+"""The default of version 0.1: points."""
+_UNFITTED = {"uniform": replace(_OLD, density_exponent=0.0), "default": _OLD, "discs": with_discs(_OLD)}
 VARIANTS = (*_UNFITTED, "fitted")
 
 Curve = dict[int, float]
@@ -205,14 +203,14 @@ def cost_rows(path: Path, progress: Progress) -> list[Row]:
     that other load on the machine slows all of them alike.
     """
     scene, view = scene_and_view(path, COST_SIZE)
-    discs = with_discs(ArtistParameters())
+    discs = with_discs(_OLD)
     configs = {
-        "32": TunedConfig(replace(discs, vpl_count=FITTED_COUNT)),
+        "32": _interleaved(replace(discs, vpl_count=FITTED_COUNT), 1),
         **{
             f"32_a_pixel_{side}x{side}": _interleaved(replace(discs, vpl_count=FITTED_COUNT * side**2), side)
             for side in INTERLEAVES
         },
-        "default": TunedConfig(ArtistParameters(vpl_count=DEFAULT_COUNT)),
+        "default": _interleaved(replace(_OLD, vpl_count=DEFAULT_COUNT), 1),
     }
     best = dict.fromkeys(configs, np.inf)
     with create_context() as context:
@@ -229,7 +227,7 @@ def cost_rows(path: Path, progress: Progress) -> list[Row]:
 
 def relaxation_rows(names: Sequence[str], present: Mapping[str, Path], progress: Progress) -> list[Row]:
     """relMSE after fewer and more Lloyd iterations, with unfitted discs: geometric means over scenes."""
-    discs = with_discs(ArtistParameters(vpl_count=FITTED_COUNT))
+    discs = with_discs(replace(_OLD, vpl_count=FITTED_COUNT))
     logs: dict[int, list[float]] = {count: [] for count in (LLOYD_ITERATIONS, *LLOYD_ITERATIONS_TRIED)}
     for name in names:
         progress(f"{name}: Lloyd iterations", 0.0)
@@ -265,7 +263,7 @@ def slope_row(name: str, path: Path, progress: Progress) -> Row:
     losses = []
     for index, importance in enumerate(places):
         progress(f"{name}: slopes", index / len(places))
-        start = ArtistParameters(vpl_count=FITTED_COUNT, density_importance=float(importance))
+        start = replace(_OLD, vpl_count=FITTED_COUNT, density_importance=float(importance))
         rotated = rotated_views(runtime, fitted_views, TunedConfig(start), rotations)
         losses.append(_fit(rotated, start).descent.loss)
     trend = np.polynomial.Polynomial.fit(places, losses, 2)

@@ -8,7 +8,6 @@ digest of the program: an interrupted run continues with the same command.
 `python -m benchmarks.tuning.fit_never_loses` prints the table by scene.
 """
 
-import hashlib
 import json
 import multiprocessing
 import sys
@@ -18,15 +17,16 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from benchmarks.harness.program_digest import program_digest
 from benchmarks.harness.row import Row
-from benchmarks.harness.scene_library import REPOSITORY, present_scenes
+from benchmarks.harness.scene_library import REPORTED_SEED, REPOSITORY, present_scenes
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.renderer.files.strict_json import strict_json
 from vpltune.tuner.evaluation.guard import UNSEEN
 
-SEED = 20261129
-"""Seed of the generated scenes, which are made for this measurement alone."""
+SEED = REPORTED_SEED
+"""Seed of the generated scenes."""
 GENERATED = 32
 """Generated scenes. A choice."""
 HELD_OUT = 4
@@ -41,10 +41,6 @@ LEAST_SHARE, MOST_KEPT = 0.95, 0.5
 """The least share of ratios up to `CLOSE`, and the largest share of fits that keep the start. A choice."""
 WORKERS = 2
 """Fits that run at once, in a process each. A choice."""
-SOURCES = ("renderer", "tuner", "shaders", "configs")
-"""Folders whose files the digest of the program covers."""
-DIGEST_LENGTH = 16
-"""Hexadecimal digits of that digest. A choice."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +89,7 @@ def mode_rows(mode: str, results: list[dict[str, Any]]) -> list[Row]:
 
 def measured(progress: Callable[[str, float], None]) -> Iterator[dict[str, Any]]:
     """The results of all fits (`result_of`), in the order of `cells`; runs the fits that have none yet."""
-    folder = REPOSITORY / "out" / "fit_never_loses" / program_digest()
+    folder = REPOSITORY / "out" / "fit_never_loses" / program_digest(Path(__file__))
     wanted = cells()
     left = [cell for cell in wanted if not (folder / cell.file).exists()]
     with multiprocessing.get_context("spawn").Pool(WORKERS, maxtasksperchild=1) as pool:
@@ -101,16 +97,6 @@ def measured(progress: Callable[[str, float], None]) -> Iterator[dict[str, Any]]
             progress(f"fit_never_loses: {name}", (len(wanted) - len(left) + index + 1) / len(wanted))
     for cell in wanted:
         yield json.loads((folder / cell.file).read_text(encoding="utf-8"))
-
-
-def program_digest() -> str:
-    """A digest of the code and data of a fit, and of this file."""
-    digest = hashlib.sha256(Path(__file__).read_bytes())
-    for source in SOURCES:
-        for path in sorted((REPOSITORY / source).rglob("*")):
-            if path.suffix in (".py", ".json", ".glsl", ".comp", ".frag", ".vert"):
-                digest.update(str(path.relative_to(REPOSITORY)).encode() + path.read_bytes())
-    return digest.hexdigest()[:DIGEST_LENGTH]
 
 
 def _measure(work: tuple[Cell, Path]) -> str:

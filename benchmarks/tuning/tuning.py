@@ -61,7 +61,6 @@ from vpltune.tuner.fitting.fit_density import (
     fit_density,
     rotated_views,
     table_rotations,
-    with_discs,
 )
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
@@ -177,7 +176,7 @@ class _Problem:
 
 
 def _problem(path: Path) -> _Problem:
-    base = with_discs(ArtistParameters(vpl_count=VPLS))
+    base = ArtistParameters(vpl_count=VPLS)
     config = TunedConfig(base, quality=Quality(rsm_resolution=RSM_RESOLUTION))
     options = SceneOptions(size=SIZE, views=VIEWS)
     prepared = prepare_scene(path, options, config, Stopwatch(), lambda stage, share: None)

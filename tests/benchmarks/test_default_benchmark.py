@@ -83,7 +83,7 @@ def test_an_interrupted_run_continues(tmp_path, monkeypatch):
         return {name: {} if made == "dark" else figures(0.1, 1.0) for name in configs}
 
     monkeypatch.setattr(default, "REPOSITORY", tmp_path)
-    monkeypatch.setattr(default, "program_digest", lambda: "digest")
+    monkeypatch.setattr(default, "program_digest", lambda benchmark: "digest")
     monkeypatch.setattr(default, "_figures", measure)
     scenes = {name: (lambda name=name: name, False) for name in ("lit", "dark")}
     first = measured({"old": default.OLD}, scenes, lambda name, share: None)

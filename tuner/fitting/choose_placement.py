@@ -5,7 +5,7 @@ together. With many, the errors of placements differ by factors, and the falloff
 placement is drawn with the start's falloff, with α = 1 where discs replace points, and judged by the robust
 error of its images. Two views screen all placements, and the best one is drawn in the others too.
 
-All placements but the start's own are clustered discs: in no scene that was tried were points better.
+All placements but the start's own are clustered discs, up to `LARGEST_DISC_COUNT` VPLs; more are points.
 """
 
 from collections.abc import Callable, Sequence

@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 from PIL import Image
 
-from vpltune.tuner.metrics.relative_squared_error import DARK_SHARE
 from vpltune.renderer.files.srgb import LUMINANCE
+from vpltune.tuner.metrics.relative_squared_error import DARK_SHARE
 
 DIVERGING = (
     *("#053061", "#2166ac", "#4393c3", "#92c5de", "#d1e5f0", "#f7f7f7"),

@@ -21,9 +21,9 @@ card and the config were written by
 
     {command}
 
-It was trained on {scenes} scenes at {counts} VPLs: {generated} generated (`tuner/prior/scene_generator.py`),
-the others from files. Each scene has {views} views of {width}×{height} pixels, each with its own light
-position.
+It was trained on {scenes} scenes at {counts} VPLs. The command says how many were generated
+(`tuner/prior/scene_generator.py`), and which library the others are from. Each scene has {views} views of
+{width}×{height} pixels, each with its own light position.
 
 ## On unseen scenes
 
@@ -63,7 +63,6 @@ def prior_card(learnt: "LearntPrior", config: TunedConfig, left_out: dict[str, s
         width=VIEW_SIZE[0],
         height=VIEW_SIZE[1],
         counts=", ".join(map(str, learnt.fits.vpl_counts)),
-        generated=config.provenance["generated"],
         folds=FOLDS,
         figures=_figures(learnt),
         worst_count=WORST,

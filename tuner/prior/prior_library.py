@@ -48,8 +48,8 @@ CONFIG = TunedConfig(visibility="maps", quality=Quality(interleave=1, rsm_resolu
 """What scenes are captured with, at several VPL counts: the defaults, and a full gather."""
 
 # Offsets of the point table. A choice.
-_ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.9, 0.4))
-ROTATIONS = {32: _ROTATIONS[:3], 128: _ROTATIONS[:2], 512: _ROTATIONS[:1]}
+_ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1))
+ROTATIONS = {32: _ROTATIONS, 128: _ROTATIONS[:2], 512: _ROTATIONS[:1]}
 """VPL counts, and the rotations of the point table at each. A choice: few VPLs are noisy, and the prior must
 not learn the noise of a single placement."""
 

@@ -98,26 +98,22 @@ class LearntPrior:
     fits: OwnFits
     prior: AutoPrior
     """Trained on all scenes."""
-    unseen: tuple[AutoPrior, ...]
-    """For each scene, the prior of the fold that leaves it out."""
     losses: dict[str, Float64[np.ndarray, "measures scenes counts splits"]]
-    """Mean losses of `auto` (the prior from `unseen`), `fit` (the scene's own fit) and `default`. The
-    measures are the robust loss of a fit and relMSE; the splits are fitted and held-out views."""
+    """Mean losses of `auto` (the prior of the fold that leaves the scene out), `fit` (the scene's own fit)
+    and `default`. The measures are the robust loss of a fit and relMSE; the splits are fitted and held-out
+    views."""
 
 
-def own_fits(scenes: tuple[PriorScene, ...], held_out: bool = False) -> OwnFits:
-    """Fit each scene by itself at each VPL count, to its fitted views in all rotations.
-
-    With `held_out`, fit to the held-out views instead, which gives the best possible result on those.
-    """
+def own_fits(scenes: tuple[PriorScene, ...]) -> OwnFits:
+    """Fit each scene by itself at each VPL count, to its fitted views in all rotations."""
     counts = tuple(int(count) for count in np.unique(scenes[0].vpl_count))
-    points = [[_fitted_point(_rows(scene, count, not held_out)) for count in counts] for scene in scenes]
+    points = [[_fitted_point(_rows(scene, count)) for count in counts] for scene in scenes]
     return OwnFits(counts, np.array(points))
 
 
-def _rows(scene: PriorScene, vpl_count: int, fitted: bool) -> LossTable:
-    """The tables of the fitted or the held-out views of a scene at one VPL count."""
-    rows = (scene.fitted == fitted) & (scene.vpl_count == vpl_count)
+def _rows(scene: PriorScene, vpl_count: int) -> LossTable:
+    """The tables of the fitted views of a scene at one VPL count."""
+    rows = scene.fitted & (scene.vpl_count == vpl_count)
     return jax.tree.map(lambda values: jnp.asarray(values[rows]), scene.table)
 
 

@@ -17,8 +17,7 @@ Corner = np.ndarray | list[float]
 KINDS = ("room", "hall", "corridor", "courtyard", "two_rooms")
 """Kinds of scenes; consecutive numbers cycle through them."""
 
-# The sides of the cube [-1, 1]³ as parallelograms (origin, u, v); u × v points outwards.
-_CUBE_SIDES = np.array(
+CUBE_SIDES = np.array(
     [
         [[1, -1, -1], [0, 2, 0], [0, 0, 2]],
         [[-1, -1, -1], [0, 0, 2], [0, 2, 0]],
@@ -29,6 +28,26 @@ _CUBE_SIDES = np.array(
     ],
     np.float64,
 )
+"""[sides, 3, 3]: the sides of the cube [-1, 1]³ as parallelograms (origin, u, v); u × v points outwards."""
+
+
+def parallelograms(name: str, corners: Float64[np.ndarray, "quads 3 3"], material: int) -> Mesh:
+    """A mesh of parallelograms (origin, u, v) with normals u × v."""
+    origin, u, v = corners[:, 0], corners[:, 1], corners[:, 2]
+    normals = np.cross(u, v)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    positions = np.stack([origin, origin + u, origin + u + v, origin + v], axis=1).reshape(-1, 3)
+    first = 4 * np.arange(len(corners))[:, None, None]
+    count = len(positions)
+    return Mesh(
+        name,
+        positions.astype(np.float32),
+        np.repeat(normals, 4, axis=0).astype(np.float32),
+        np.zeros((count, 2), np.float32),
+        np.ones((count, 3), np.float32),
+        (first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3).astype(np.int32),
+        material,
+    )
 
 
 @dataclass
@@ -49,24 +68,8 @@ class _Builder:
         return len(self.materials) - 1
 
     def quads(self, name: str, corners: Float64[np.ndarray, "quads 3 3"], material: int) -> None:
-        """Add a mesh of parallelograms (origin, u, v) with normals u × v."""
-        origin, u, v = corners[:, 0], corners[:, 1], corners[:, 2]
-        normals = np.cross(u, v)
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        positions = np.stack([origin, origin + u, origin + u + v, origin + v], axis=1).reshape(-1, 3)
-        first = 4 * np.arange(len(corners))[:, None, None]
-        count = len(positions)
-        self.meshes.append(
-            Mesh(
-                name,
-                positions.astype(np.float32),
-                np.repeat(normals, 4, axis=0).astype(np.float32),
-                np.zeros((count, 2), np.float32),
-                np.ones((count, 3), np.float32),
-                (first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3).astype(np.int32),
-                material,
-            )
-        )
+        """Add a mesh of `parallelograms`."""
+        self.meshes.append(parallelograms(name, corners, material))
 
     def box(
         self,
@@ -82,7 +85,7 @@ class _Builder:
         center, half = (low + high) / 2.0, (high - low) / 2.0
         c, s = math.cos(turn), math.sin(turn)
         rotation = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-        sides = _CUBE_SIDES * half @ rotation.T
+        sides = CUBE_SIDES * half @ rotation.T
         sides[:, 0] += center
         self.quads(name, sides, material)
         if kept:

@@ -53,7 +53,7 @@ def learn_prior(scenes: tuple[PriorScene, ...], progress: Progress) -> LearntPri
     fold = np.arange(len(scenes)) % FOLDS
     of_folds = train(rows, fold == np.arange(FOLDS)[:, None])
     unseen = tuple(of_folds[index] for index in fold)
-    return LearntPrior(scenes, fits, prior, unseen, _losses(scenes, rows, fits, unseen))
+    return LearntPrior(scenes, fits, prior, _losses(scenes, rows, fits, unseen))
 
 
 def train_prior(

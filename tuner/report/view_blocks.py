@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from vpltune.renderer.files.srgb import LUMINANCE
 from vpltune.renderer.frame.passes.tone_mapping import EXPOSURE_KEY
 from vpltune.tuner.evaluation.view_images import VARIANTS, ViewImages
 from vpltune.tuner.metrics.error_maps import DIVERGING, MAGMA, map_png, signed_error
-from vpltune.renderer.files.srgb import LUMINANCE
 from vpltune.tuner.metrics.tone_curve import display_image
 from vpltune.tuner.metrics.view_metrics import hdr_flip_map
 

@@ -141,12 +141,13 @@ def capture_views(
     references: tuple[ReferenceView, ...],
     *,
     statistics: bool = False,
+    maps: bool = True,
 ) -> tuple[CapturedView, ...]:
-    """Render every view and read back its buffers, with its scene statistics if `statistics` is true."""
+    """Render every view and read back its buffers, with its `statistics` and visibility `maps` if asked."""
     captured = []
     for view, reference in zip(views, references, strict=True):
         drawn = runtime.draw(view, config)
-        frame = drawn.capture()
+        frame = drawn.capture(maps=maps)
         measured = drawn.read_statistics() if statistics else None
         drawn_with = config.with_parameters(drawn.read_parameters())
         captured.append(CapturedView(view, reference, frame, drawn_with, measured))

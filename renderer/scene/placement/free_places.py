@@ -44,7 +44,7 @@ class Places:
         return (hits >= WALLED_IN * self.hit.shape[1]) & (self.front.sum(axis=1) >= FROM_FRONT * hits)
 
     def reach(self) -> Float64[np.ndarray, " places"]:
-        """Distance in voxels that nine tenths of the directions do not exceed; without a hit it counts as 0."""
+        """Distance in voxels that nine in ten directions do not exceed; one without a hit has 0."""
         return np.quantile(self.distance, 0.9, axis=1)
 
     def share_walled_in(self) -> float:

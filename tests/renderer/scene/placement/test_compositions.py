@@ -78,8 +78,8 @@ def test_choices_do_not_depend_on_the_origin():
     """Moved by powers of two, which float64 adds exactly; placement rounds to 10⁻⁵ voxels."""
     here, there = HARD["table-top"](), HARD["table-top"]()
     shift = np.array([1024.0, -256.0, 4096.0])
-    # All instances share one matrix.
-    there.instances[0].to_world[:3, 3] += shift
+    for instance in there.instances:
+        instance.to_world[:3, 3] += shift
     camera, moved = default_camera(here)[0], default_camera(there)[0]
     assert moved.position_world - shift == pytest.approx(camera.position_world, abs=1e-5)
     light, moved_light = default_light(here, camera)[0], default_light(there, moved)[0]

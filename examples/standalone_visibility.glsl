@@ -170,11 +170,13 @@ Texel texel_at(int vpl, ivec2 place, mat3 frame) {
 }
 
 // The overlap of a pixel whose tangent plane hides the middle of a disc: both the pixel and the place where that plane
-// cuts the disc are behind the surface.
+// cuts the disc are behind the surface. One that shows its back to the pixel hides it wholly.
 float rim_overlap(Texel met, vec3 offset, vec3 normal, vec3 axis) {
     vec3 flat_normal = normal - axis * dot(normal, axis);
     vec3 cut = flat_normal * (dot(offset, normal) / max(dot(flat_normal, flat_normal), 1e-12));
-    return min(dot(met.end - offset, met.plane), dot(met.end - cut, met.plane)) / length(offset);
+    float height = min(dot(met.end - offset, met.plane), dot(met.end - cut, met.plane));
+    bool back = dot(met.plane, normal) < 0.0 && height > -1e-4 * (length(met.end) + length(offset));
+    return back ? 1.0 : height / length(offset);
 }
 
 // The overlap of a pixel and a plane that a corner extends to the pixel's direction.

@@ -8,6 +8,7 @@ median and worst over the scenes, and the share of scenes within a bound. Scenes
 import dataclasses
 from collections.abc import Callable, Iterator
 
+import moderngl
 import numpy as np
 from jaxtyping import Bool, UInt8
 from PIL import Image, ImageDraw
@@ -29,6 +30,7 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.image_file import write_png
 from vpltune.renderer.frame.capture import CapturedFrame
 from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.gpu.gpu_context import create_context
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.mitsuba_import import read_mitsuba
 from vpltune.renderer.scene.placement import default_camera, default_light
@@ -66,17 +68,20 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
     measured: dict[str, list[dict[str, float]]] = {group: [] for group in SEEDS}
     tiles = []
     makers = list(_scenes())
-    for index, (name, group, make) in enumerate(makers):
-        progress(f"automatic_views: {name}", index / len(makers))
-        image, figures = shown(make())
-        measured[group].append(figures)
-        tiles.append(_captioned(image, f"{name} {_shares(figures)}"))
+    with create_context() as context:
+        for index, (name, group, make) in enumerate(makers):
+            progress(f"automatic_views: {name}", index / len(makers))
+            image, figures = shown(make(), context)
+            measured[group].append(figures)
+            tiles.append(_captioned(image, f"{name} {_shares(figures)}"))
     write_png(REPOSITORY / "out" / "automatic_views" / "contact_sheet.png", _sheet(tiles))
     progress("automatic_views", 1.0)
     return [row for group, figures in measured.items() for row in _rows(group, figures)]
 
 
-def shown(scene: Scene) -> tuple[UInt8[np.ndarray, "height width 3"], dict[str, float]]:
+def shown(
+    scene: Scene, context: moderngl.Context
+) -> tuple[UInt8[np.ndarray, "height width 3"], dict[str, float]]:
     """The image of a scene's automatic view, and the figures named in `BOUNDS`.
 
     The background of an object, in place of a room, is named `open.background`.
@@ -85,9 +90,8 @@ def shown(scene: Scene) -> tuple[UInt8[np.ndarray, "height width 3"], dict[str, 
     camera, _ = default_camera(bare)
     light, _ = default_light(bare, camera)
     view = View("automatic", "fitted", SIZE, camera, (light,))
-    runtime = Runtime(bare)
+    runtime = Runtime(bare, context=context)
     image, captured = runtime.render(view, CONFIG), runtime.capture(view, CONFIG, maps=False)
-    runtime.context.release()
     figures = {
         "background": 1.0 - float(captured.valid.mean()),
         "largest_surface": largest_surface(captured),

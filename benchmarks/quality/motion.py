@@ -1,10 +1,13 @@
 """Flicker under motion: how much more the image changes from frame to frame than the true light does.
 
-There are two clips. In one, a spot sweeps through the gallery. In the other, a sun stands still over a
-courtyard whose bounds grow, because a part of it rises. The figure is the mean absolute change of indirect
-irradiance from frame to frame, divided by the mean irradiance, minus the same figure of a reference: the
-frames with 16 times the VPLs from an RSM of twice the resolution. VPLs are points, which stir as the RSM
-does: clusters add movement of their own.
+There are three clips. In the first, a spot sweeps through the gallery. In the second, a camera is carried
+through it. In the third, a sun stands still over a courtyard whose bounds grow, because a part of it rises.
+The figure is the mean absolute change of indirect irradiance from frame to frame, divided by the mean
+irradiance, minus the same figure of a reference: the frames with `REFERENCE_VPLS` points from an RSM of twice
+the resolution.
+
+The default config is compared with that of version 0.1. Options of the RSM are compared with points, which
+stir as the RSM does: clusters add movement of their own.
 
 `python -m benchmarks.quality.motion FOLDER` writes motion.png, a plot of the change at every step, and
 motion.mp4, the clip of the spot. `python -m benchmarks.quality.motion FOLDER box` writes box.mp4, in which a
@@ -21,11 +24,13 @@ from jaxtyping import Float32
 
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import own_scene, scene_and_view
+from benchmarks.tuning.default import OLD
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.atomic_file import written_whole
 from vpltune.renderer.files.video_file import clip_writer
+from vpltune.renderer.frame.clip_state import ClipState
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
 from vpltune.renderer.scene.animation import Pose
@@ -44,22 +49,59 @@ VPL_COUNT = 256
 """VPLs of the compared images. A choice: few enough to flicker."""
 RSM_RESOLUTION = 1024
 """Texels along the side of an RSM face: the runtime's own for one or two faces."""
-REFERENCE_FACTOR = 16
-"""VPLs of the reference over those of the compared images. A choice."""
+REFERENCE_VPLS = 4096
+"""VPLs of the reference. A choice: 16 times `VPL_COUNT`, and as many as have maps."""
 REFERENCE_RSM_FACTOR = 2
-"""The same for the RSM's resolution. A choice."""
+"""Resolution of the reference's RSM over that of the compared images. A choice."""
 REFERENCE_FRAMES = 24
 """Steps of the clip, evenly spread, at which the reference is drawn. A choice: the mean needs no more."""
 
 STEADY = RuntimeOptions()
-VARIANTS = {
-    "neither": RuntimeOptions(rsm_filtering=1, rsm_snapping=False),
-    "snapping": RuntimeOptions(rsm_filtering=1),
-    "filtering": RuntimeOptions(rsm_snapping=False),
-    "both": STEADY,
-}
-SPOT_VARIANTS = ("neither", "filtering")
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What a clip is drawn with."""
+
+    config: TunedConfig
+    options: RuntimeOptions = STEADY
+    against: str | None = None
+    """Key of the variant that it is compared with; None for those that others are compared with."""
+
+
+def _points(vpl_count: int, rsm_factor: int = 1) -> TunedConfig:
+    """Points in place of discs, drawn by flux alone."""
+    return TunedConfig(
+        ArtistParameters(
+            vpl_count=vpl_count, falloff_footprint=0.5, density_importance=0.0, lloyd_iterations=0
+        ),
+        quality=Quality(interleave=1, rsm_resolution=RSM_RESOLUTION * rsm_factor),
+    )
+
+
+def variants() -> dict[str, Variant]:
+    """All variants by name."""
+    few = _points(VPL_COUNT)
+    return {
+        "old_default": Variant(OLD),
+        "default": Variant(TunedConfig(), against="old_default"),
+        "neither": Variant(few, RuntimeOptions(rsm_filtering=1, rsm_snapping=False)),
+        "snapping": Variant(few, RuntimeOptions(rsm_filtering=1), "neither"),
+        "filtering": Variant(few, RuntimeOptions(rsm_snapping=False), "neither"),
+        "both": Variant(few, STEADY, "neither"),
+    }
+
+
+CAMERA_VARIANTS = ("old_default", "default")
+"""Variants for the clip of the camera: nothing that a camera does moves the RSM of a room's spot."""
+SPOT_VARIANTS = (*CAMERA_VARIANTS, "neither", "filtering")
 """Variants for the clip with the spot, whose RSM face follows its cone and not the bounds: none snaps it."""
+SUN_VARIANTS = ("neither", "snapping", "filtering", "both")
+"""Variants for the clip of the sun, whose RSM face follows the bounds."""
+CAMERA_REACH = 0.05
+"""Way of the carried camera, in diagonals of the scene. A choice: it stays in the room."""
+CAMERA_TURN = 0.2
+"""Largest angle, in radians, that the carried camera turns by. A choice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +110,7 @@ class Clip:
 
     name: str
     variants: tuple[str, ...]
-    """Keys of `VARIANTS`."""
+    """Keys of `variants()`."""
     scene: Scene
     views: tuple[View, ...]
     transforms: tuple[np.ndarray, ...] | None = None
@@ -76,21 +118,18 @@ class Clip:
 
 
 def rows(progress: Callable[[str, float], None]) -> list[Row]:
-    """For each clip and variant, its change beyond the reference's, against that of the variant `neither`."""
+    """For each clip and variant, its change beyond the reference's, against that of another variant."""
     found = []
-    for clip in (swept_spot(), rising_bounds()):
+    for clip in clips():
         changes = measured_changes(clip, progress)
         truth = changes.pop("reference").mean()
         excess = {variant: float(change.mean() - truth) for variant, change in changes.items()}
-        against = (
-            "neither snapping nor filtering, with visibility maps"
-            f" (the reference's own change, {truth:.4f}, is subtracted)"
-        )
-        found += [
-            Row(f"motion_{clip.name}_{variant}", value, "of mean per frame", against, excess["neither"])
-            for variant, value in excess.items()
-            if variant != "neither"
-        ]
+        for variant, value in excess.items():
+            against = variants()[variant].against
+            if against is not None:
+                about = f"{against}; the reference's own change, {truth:.4f}, is subtracted"
+                name = f"motion_{clip.name}_{variant}"
+                found.append(Row(name, value, "of mean per frame", about, excess[against]))
     return found
 
 
@@ -101,10 +140,11 @@ def measured_changes(
     changes = {}
     for index, name in enumerate(clip.variants):
         progress(f"motion, {clip.name}", index / (len(clip.variants) + 1))
-        runtime = Runtime(clip.scene, VARIANTS[name])
-        changes[name] = _changes(irradiance(runtime, _config(), clip, range(FRAMES)))
+        variant = variants()[name]
+        runtime = Runtime(clip.scene, variant.options)
+        changes[name] = _changes(irradiance(runtime, variant.config, clip, range(FRAMES)))
     progress(f"motion, {clip.name}", len(clip.variants) / (len(clip.variants) + 1))
-    runtime, config = Runtime(clip.scene, STEADY), _config(REFERENCE_FACTOR, REFERENCE_RSM_FACTOR)
+    runtime, config = Runtime(clip.scene, STEADY), _points(REFERENCE_VPLS, REFERENCE_RSM_FACTOR)
     steps = [_changes(irradiance(runtime, config, clip, (start, start + 1))) for start in reference_steps()]
     return changes | {"reference": np.concatenate(steps)}
 
@@ -112,17 +152,22 @@ def measured_changes(
 def irradiance(
     runtime: Runtime, config: TunedConfig, clip: Clip, frames: range | tuple[int, ...]
 ) -> Float32[np.ndarray, "frames height width 3"]:
-    """Indirect irradiance [W/m²] of some frames of a clip."""
-    images = []
+    """Indirect irradiance [W/m²] of successive frames of a clip."""
+    images, state = [], ClipState()
     for frame in frames:
         _set_pose(runtime, clip, frame)
-        images.append(runtime.render(clip.views[frame], config, layer="irradiance"))
+        images.append(runtime.render(clip.views[frame], config, state, layer="irradiance"))
     return np.stack(images)
 
 
 def reference_steps() -> list[int]:
     """The frames at which the steps of the reference begin."""
     return np.linspace(0, FRAMES - 2, REFERENCE_FRAMES).astype(int).tolist()
+
+
+def clips() -> tuple[Clip, ...]:
+    """The clips that are measured."""
+    return swept_spot(), carried_camera(), rising_bounds()
 
 
 def swept_spot() -> Clip:
@@ -135,11 +180,27 @@ def swept_spot() -> Clip:
     return Clip("spot", SPOT_VARIANTS, scene, views)
 
 
+def carried_camera() -> Clip:
+    """The gallery's camera moves as its spot does in `swept_spot`, and turns on the way."""
+    scene, view = _shipped("gallery")
+    low, high = scene.bounds()
+    reach = CAMERA_REACH * float(np.linalg.norm(high - low))
+    views = []
+    for share in _shares():
+        angle = CAMERA_TURN * np.sin(2.0 * np.pi * share)
+        turn = np.eye(4)
+        turn[:3, :3] = [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
+        to_world = view.camera.to_world @ turn
+        to_world[:3, 3] += reach * (share - 0.5) * view.camera.to_world[:3, 0]
+        views.append(replace(view, camera=replace(view.camera, to_world=to_world)))
+    return Clip("camera", CAMERA_VARIANTS, scene, tuple(views))
+
+
 def rising_bounds() -> Clip:
     """The smallest part of the courtyard rises until the bounds are twice as high; the sun stands still."""
     scene, view = _shipped("courtyard")
     moved = _smallest_part_moved(scene, lambda share: (0.0, 0.5 + share, 0.0))
-    return Clip("sun", tuple(VARIANTS), scene, (view,) * FRAMES, moved)
+    return Clip("sun", SUN_VARIANTS, scene, (view,) * FRAMES, moved)
 
 
 def _shares() -> np.ndarray:
@@ -159,18 +220,6 @@ def _swept(light: Light, reach: float, share: float) -> Light:
 def _shipped(name: str) -> tuple[Scene, View]:
     scene, view = scene_and_view(own_scene(name), SIZE)
     return scene, replace(view, lights=view.lights[:1])
-
-
-def _config(vpl_factor: int = 1, rsm_factor: int = 1) -> TunedConfig:
-    return TunedConfig(
-        ArtistParameters(
-            vpl_count=VPL_COUNT * vpl_factor,
-            falloff_footprint=0.5,
-            density_importance=0.0,
-            lloyd_iterations=0,
-        ),
-        quality=Quality(rsm_resolution=RSM_RESOLUTION * rsm_factor),
-    )
 
 
 def _changes(images: Float32[np.ndarray, "frames height width 3"]) -> Float32[np.ndarray, " steps"]:
@@ -224,20 +273,20 @@ def _set_pose(runtime: Runtime, clip: Clip, frame: int) -> None:
 
 def write_clip(path: Path, clip: Clip) -> None:
     """Write a clip, drawn with the default config; all frames have the exposure of the first."""
-    runtime, config = Runtime(clip.scene), TunedConfig()
+    runtime, config, state = Runtime(clip.scene), TunedConfig(), ClipState()
     views = [replace(view, size=CLIP_SIZE) for view in clip.views]
     _set_pose(runtime, clip, 0)
     exposure = runtime.draw(views[0], config).read_exposure()
     with clip_writer(path, CLIP_SIZE, CLIP_FPS) as write:
         for frame, view in enumerate(views):
             _set_pose(runtime, clip, frame)
-            write(runtime.render(view, config, exposure=exposure))
+            write(runtime.render(view, config, state, exposure=exposure))
 
 
 def _main(folder: Path) -> None:
     changes = {
         clip.name: measured_changes(clip, lambda stage, share: print(f"{stage} {share:.0%}"))
-        for clip in (swept_spot(), rising_bounds())
+        for clip in clips()
     }
     write_plot(folder / "motion.png", changes)
     write_clip(folder / "motion.mp4", swept_spot())

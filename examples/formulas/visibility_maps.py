@@ -62,7 +62,11 @@ def rim_overlap(end, end_normal, receiver, receiver_normal) -> float:
     """`overlap` for a receiver whose tangent plane hides the middle of a disc."""
     flat = receiver_normal * [1.0, 1.0, 0.0]
     cut = flat * (dot(receiver, receiver_normal) / max(dot(flat, flat), 1e-12))
-    return float(min(dot(end - receiver, end_normal), dot(end - cut, end_normal)) / length(receiver))
+    height = min(dot(end - receiver, end_normal), dot(end - cut, end_normal))
+    is_back = dot(end_normal, receiver_normal) < 0.0
+    if is_back and height > -ROUNDING * (length(end) + length(receiver)):
+        return 1.0
+    return float(height / length(receiver))
 
 
 def corner_overlap(end, end_normal, receiver, receiver_normal) -> float:

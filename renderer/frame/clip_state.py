@@ -4,7 +4,9 @@ import moderngl
 
 
 class ClipState:
-    """The eased parameters of an `auto` config, on the GPU. Make one for each clip, and none for a still.
+    """The discs and the eased parameters of an `auto` config. Make one for each clip, and none for a still.
+
+    All of it is on the GPU. Discs start where the frame before left them, so they flicker less.
 
     It stays with the OpenGL context that it was first drawn on.
 

@@ -110,12 +110,15 @@ float surface_overlap(MetSurface met, vec3 receiver, vec3 receiver_normal) {
 }
 
 // The same for a receiver whose tangent plane hides the middle of a disc. The disc's part in sight begins where that
-// plane cuts the disc's, and it is beyond the surface if that place is behind the surface too.
+// plane cuts the disc's, and it is beyond the surface if that place is behind the surface too. A surface that shows its
+// back to the receiver hides it wholly, however thin: it may be the other side of the receiver's own wall.
 float rim_overlap(MetSurface met, vec3 receiver, vec3 receiver_normal) {
     float squared = max(dot(receiver_normal.xy, receiver_normal.xy), 1e-12);
     vec3 cut = vec3(receiver_normal.xy * (dot(receiver, receiver_normal) / squared), 0.0);
-    return min(dot(met.end - receiver, met.normal), dot(met.end - cut, met.normal))
-        * inversesqrt(dot(receiver, receiver));
+    float height = min(dot(met.end - receiver, met.normal), dot(met.end - cut, met.normal));
+    float distance = length(receiver);
+    bool is_back = dot(met.normal, receiver_normal) < 0.0;
+    return is_back && height > -VISIBILITY_ROUNDING * (distance + length(met.end)) ? 1.0 : height / distance;
 }
 
 // Whether a hit lies behind the plane of another one, by more than rounding.

@@ -95,9 +95,12 @@ def test_steadier_than_without(monkeypatch):
 
     for name, value in {"SIZE": (32, 24), "FRAMES": 8, "VPL_COUNT": 64, "RSM_RESOLUTION": 128}.items():
         monkeypatch.setattr(motion, name, value)
-    monkeypatch.setattr(motion, "REFERENCE_FRAMES", 2)
+    for name, value in {"REFERENCE_FRAMES": 2, "REFERENCE_VPLS": 1024}.items():
+        monkeypatch.setattr(motion, name, value)
     rows = {row.name: row for row in motion.rows(lambda stage, share: None)}
     assert set(rows) == {
+        "motion_spot_default",
+        "motion_camera_default",
         "motion_spot_filtering",
         "motion_sun_snapping",
         "motion_sun_filtering",

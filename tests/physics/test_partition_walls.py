@@ -125,6 +125,35 @@ def test_a_corner_has_a_closed_form():
         np.testing.assert_array_equal(np.asarray(seen)[:, 0], places[:, 0] < wall)
 
 
+def test_a_wall_without_thickness_has_a_dark_side():
+    """A disc beside a wall: the front of the wall is in sight and its back is not, at any height.
+
+    The disc lies at the origin and reaches through the wall, which shades nobody else. Seeded.
+    """
+    random = np.random.default_rng(11)
+    disc = VirtualPointLights(
+        jnp.zeros((1, 3)), jnp.array([[0.0, 0.0, 1.0]]), jnp.array([1.0]), jnp.ones((1, 3))
+    )
+    parameters = VisibilityParameters(
+        jnp.float32(DISCS.visibility_bias), jnp.float32(DISCS.visibility_softness)
+    )
+    for wall in (0.05, 0.5):
+        # The map's origin is lifted: no place is as low as that.
+        places = np.column_stack(
+            [np.full(256, wall), random.uniform(-2.0, 2.0, 256), random.uniform(0.05, 2.0, 256)]
+        )
+        for normal, expected in ((-1.0, 1.0), (1.0, 0.0)):
+            normals = np.tile(np.array([normal, 0.0, 0.0], np.float32), (len(places), 1))
+            seen = vpl_visibility(
+                Receivers(jnp.asarray(places, jnp.float32), jnp.asarray(normals)),
+                disc,
+                # The floor that it looks up to is beyond all places.
+                corner_map(100.0, wall, 24),
+                parameters,
+            )
+            np.testing.assert_array_equal(np.asarray(seen)[:, 0], expected)
+
+
 @KINDS
 def test_a_room_with_a_board_stays_as_bright(gl_context, parameters):
     """Against ray-traced visibility, maps darken by less than 0.5 % on average."""

@@ -210,7 +210,10 @@ class _Lookup:
         cut = flat * (away / jnp.maximum(_dot(flat, flat), 1e-12))[..., None]
 
         def rim(other: Array, other_normal: Array) -> Array:
-            return jnp.minimum(_dot(other - receiver, other_normal), _dot(other - cut, other_normal))
+            height = jnp.minimum(_dot(other - receiver, other_normal), _dot(other - cut, other_normal))
+            rounding = VISIBILITY_ROUNDING * (distance + jnp.linalg.norm(other, axis=-1))
+            is_back = (_dot(other_normal, normal) < 0.0) & (height > -rounding)
+            return jnp.where(is_back, distance, height)
 
         def corner(other: Array, other_normal: Array) -> Array:
             between = other - receiver

@@ -88,8 +88,8 @@ def _surface_shares(space: FreeSpace, sight: Sight) -> Float64[np.ndarray, " sur
         (np.round((facing * NORMAL_STEP * points).sum(axis=1) / PLANE))[:, None] * [1.0, 0.0, 0.0],
     )
     facing[detail] = 0.0
-    labels: Int64[np.ndarray, "rays 7"] = np.concatenate(
-        [facing, place, np.floor(albedo / ALBEDO_STEP) @ [[1.0], [8.0], [64.0]]], axis=1
+    labels: Int64[np.ndarray, "rays 9"] = np.concatenate(
+        [facing, place, np.floor(albedo / ALBEDO_STEP)], axis=1
     ).astype(np.int64)
     _, counts = np.unique(labels, axis=0, return_counts=True)
     return counts / counts.sum()

@@ -34,7 +34,9 @@ def test_shares_are_those_of_the_pixels():
 
 
 def test_hard_scenes_have_neither_cameras_nor_lights():
-    for name, make in hard_scenes().items():
+    makers = hard_scenes()
+    assert makers
+    for name, make in makers.items():
         scene = make()
         assert scene.name == name and not scene.cameras and not scene.lights
         assert scene.triangle_count() > 0

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from benchmarks.harness.scene_library import OUTSIDE_SCENES, present_scenes
 from benchmarks.tuning import default
 from benchmarks.tuning.default import FIGURES, Measured, measured, ratio_rows, sources, table, write_front
 
@@ -39,9 +40,13 @@ def test_scenes_that_are_kept_away_chose_nothing():
     assert generated == [True] * default.GENERATED
     generated = [chose[name] for name in chose if name.endswith(f"-of-{default.REPORTED_SEED}")]
     assert generated == [False] * default.GENERATED
-    assert not any(chose.get(name, False) for name in default.RESERVED)
     kept_away = {"bevy-depthoffieldexample", "cube2-steelribs", "kajiya-cornell-box", "playcanvas-house"}
-    assert kept_away <= set(default.RESERVED)
+    assert set(default.RESERVED) == {*kept_away, "gallery"}
+    # Scenes of others are not in the repository.
+    assert kept_away <= set(OUTSIDE_SCENES)
+    present = [name for name in default.RESERVED if name in present_scenes()]
+    assert "gallery" in present
+    assert [chose[name] for name in present] == [False] * len(present)
 
 
 def test_the_old_default_is_that_of_version_1():

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from built_scenes import colored_room, room_view
 
+import benchmarks.speed.gpu_alternatives as gpu_alternatives
 import benchmarks.speed.gpu_frames as gpu_frames
+import benchmarks.speed.gpu_lights as gpu_lights
 from benchmarks.harness.machine_rates import MachineRates, measured_rates
 from benchmarks.speed.frame_limits import lights_per_pixel, pass_bytes, pass_limits, pass_operations
 from benchmarks.speed.gpu_frames import MeasuredScene, Series, Timing, frame_count, frame_rows, pass_rows
-from benchmarks.speed.gpu_lights import LIGHT_ROWS
 from benchmarks.speed.surrogate import FLOPS_PER_PAIR
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
@@ -39,8 +40,8 @@ def test_the_longer_of_arithmetic_and_memory_rules():
 
 def test_rates_are_positive_and_a_software_renderer_is_timed_by_the_wall_clock(gl_context):
     rates = measured_rates(gl_context)
-    assert rates.operations_per_second > 1e7
-    assert rates.bytes_per_second > 1e7
+    assert rates.operations_per_second > 0.0
+    assert rates.bytes_per_second > 0.0
     assert rates.clock == "wall" or "llvmpipe" not in gl_context.info["GL_RENDERER"]
 
 
@@ -99,7 +100,7 @@ def test_rows_of_a_small_table(gl_context, monkeypatch):
     monkeypatch.setattr(gpu_frames, "SIZES", {"1080p": SIZE})
     monkeypatch.setattr(gpu_frames, "COUNTS", (4, 16))
     monkeypatch.setattr(gpu_frames, "PASS_CONFIG", TunedConfig(ArtistParameters(vpl_count=16)))
-    measured = MeasuredScene(colored_room(), room_view(), gl_context, RATES, Timing(frames=1))
+    measured = measured_room(gl_context)
     passes = {row.name: row for row in pass_rows(measured)}
     assert {"pass.1080p.maps.vpl_visibility_maps", "pass.1080p.transmittance.vpl_gather"} < set(passes)
     assert "pass.1080p.transmittance.vpl_visibility_maps" not in passes
@@ -108,4 +109,34 @@ def test_rows_of_a_small_table(gl_context, monkeypatch):
     assert frames[0].name == "frame.1080p.4_points.full"
     assert frames[-1].name == "frame.1080p.16_discs.interleaved"
     assert all(row.value > 0.0 and row.against_value > 0.0 for row in (*passes.values(), *frames))
-    assert LIGHT_ROWS == 7
+
+
+def measured_room(gl_context) -> MeasuredScene:
+    return MeasuredScene(colored_room(), room_view(), gl_context, RATES, Timing(frames=1))
+
+
+def test_rows_of_few_lights(gl_context, monkeypatch):
+    """A row for each path and count, and the cost of one light in tiles beside a draw of its own."""
+    monkeypatch.setattr(gpu_lights, "SIZES", {"1080p": SIZE})
+    monkeypatch.setattr(gpu_lights, "LIGHT_COUNTS", (2, 4, 8))
+    monkeypatch.setattr(gpu_lights, "PER_DRAW_LIGHTS", 12)
+    rows = list(gpu_lights.light_rows(measured_room(gl_context)))
+    names = [f"lights.1080p.{count}_{path}" for path in ("tiles", "volumes") for count in (2, 4, 8)]
+    assert [row.name for row in rows] == [*names, "lights.1080p.per_light_tiles"]
+    assert len(rows) == gpu_lights.LIGHT_ROWS
+    assert all(row.value > 0.0 and row.against_value > 0.0 and row.unit == "ms" for row in rows)
+    assert rows[-1].value == rows[2].value / 8
+
+
+def test_rows_of_alternatives(gl_context, monkeypatch):
+    """Placement, gather and Python's part; the latter's limit is no measurement."""
+    monkeypatch.setattr(gpu_alternatives, "SIZES", {"720p": SIZE})
+    for name, value in {"VPL_COUNT": 16, "READBACK_DRAWS": 8, "PYTHON_LIGHTS": 8}.items():
+        monkeypatch.setattr(gpu_alternatives, name, value)
+    for name in ("PYTHON_FRAMES", "PYTHON_BATCHES"):
+        monkeypatch.setattr(gpu_alternatives, name, 2)
+    rows = {row.name: row for row in gpu_alternatives.alternative_rows(measured_room(gl_context))}
+    assert list(rows) == ["vpls.720p.placement", "vpls.720p.gather", "python.per_frame"]
+    assert all(row.value > 0.0 and row.against_value > 0.0 and row.unit == "ms" for row in rows.values())
+    assert "from 8," in rows["vpls.720p.gather"].against
+    assert rows["python.per_frame"].against_value == gpu_alternatives.PYTHON_LIMIT_MS

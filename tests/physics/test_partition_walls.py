@@ -5,21 +5,19 @@ foot hits the floor in front of it, and a receiver on the floor behind lies in t
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from built_scenes import colored_room, room_view
+from partition import partitioned_rooms
 
 from examples.formulas import visibility_maps as formulas
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import CapturedFrame
 from vpltune.renderer.frame.runtime import Runtime
-from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.placement import resolve_camera_and_lights
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.reference import ray_traced_visibility
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights, gather_inputs
@@ -31,7 +29,6 @@ from vpltune.tuner.surrogate.vpl_visibility import (
     vpl_visibility,
 )
 
-PARTITIONS = Path(__file__).resolve().parents[1] / "data" / "partitions"
 POINTS = ArtistParameters(vpl_count=1024, lloyd_iterations=0, falloff_footprint=0.5, density_importance=0.0)
 DISCS = replace(POINTS, lloyd_iterations=2, falloff_footprint=1.0, density_importance=0.5)
 KINDS = pytest.mark.parametrize("parameters", [POINTS, DISCS], ids=["points", "discs"])
@@ -44,17 +41,24 @@ def lit_by(
     return np.asarray(jax.jit(gather)(receivers, vpls, FalloffParameters.of(parameters), visibility))
 
 
-def check_partition(gl_context, thickness: str, parameters: ArtistParameters) -> None:
-    """What the far lamp leaks is at most 1 % of the own lamp's mean, anywhere; half a percent was measured.
+@KINDS
+@pytest.mark.parametrize(
+    "thickness",
+    [0.30, pytest.param(0.10, marks=pytest.mark.slow), pytest.param(0.05, marks=pytest.mark.slow), 0.02],
+)
+def test_nothing_shows_behind_a_partition(gl_context, thickness, parameters):
+    """What the far lamp leaks is at most 1 % of the own lamp's mean, anywhere.
 
+    Through 0.30 and 0.02 m, at most 0.05 and 0.7 % were measured.
     Twins agree to 1e-3 of that mean.
     """
-    path = PARTITIONS / f"ha_{thickness}.gltf"
-    scene = read_scene(path)
-    camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
+    scene = partitioned_rooms(thickness)
+    camera = scene.cameras[0]
     runtime = Runtime(scene, context=gl_context)
     config = TunedConfig(parameters, visibility="maps")
-    far, own = (runtime.capture(View("room", "fitted", (48, 36), camera, (each,)), config) for each in lights)
+    far, own = (
+        runtime.capture(View("room", "fitted", (48, 36), camera, (each,)), config) for each in scene.lights
+    )
     usual = own.vpl_irradiance[own.valid].mean()
     assert usual == pytest.approx(0.03, rel=0.1)
     leak = far.vpl_irradiance[far.valid]
@@ -65,18 +69,6 @@ def check_partition(gl_context, thickness: str, parameters: ArtistParameters) ->
     receivers, vpls = gather_inputs(far)
     twin = lit_by(far, parameters, map_visibility(far, receivers, vpls, parameters))
     assert np.abs(twin - leak).max() <= 1e-3 * usual
-
-
-@KINDS
-def test_nothing_shows_behind_a_thin_partition(gl_context, parameters):
-    check_partition(gl_context, "0.02", parameters)
-
-
-@pytest.mark.slow
-@KINDS
-@pytest.mark.parametrize("thickness", ["0.05", "0.1", "0.3"])
-def test_nothing_shows_behind_a_partition(gl_context, thickness, parameters):
-    check_partition(gl_context, thickness, parameters)
 
 
 def corner_map(height: float, wall: float, size: int) -> MapTexels:

@@ -14,7 +14,7 @@ from vpltune.renderer.scene.views import scaled_view
 from vpltune.tuner.reference import reference_views
 
 WIDTHS = [200.0, 2e3, 1e4]
-"""Of the ground, metres."""
+"""Widths of the ground in metres."""
 FEW = TunedConfig(ArtistParameters(vpl_count=64, density_importance=0.5), visibility="transmittance")
 COARSE = TunedConfig(FEW.parameters, visibility="transmittance", quality=Quality(rsm_resolution=256))
 

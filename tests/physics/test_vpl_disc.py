@@ -73,13 +73,14 @@ def test_exact_over_the_horizon():
 
 
 @pytest.mark.parametrize(
-    ("nearest", "reach", "off"), [(0.05, 1.0, 0.35), (1.0, 3.0, 0.15), (3.0, 10.0, 0.03)]
+    ("nearest", "reach", "lost"), [(0.05, 1.0, 0.22), (1.0, 3.0, 0.10), (3.0, 10.0, 0.01)]
 )
-def test_cut_at_the_horizon(nearest, reach, off):
-    """The part over the horizon gives what its pieces give, but for `off` in the mean.
+def test_cut_at_the_horizon(nearest, reach, lost):
+    """The disc of the part over the horizon gives less than its pieces do, the more the nearer it is.
 
-    As a disc of its area, it still reaches below the horizon, where light counts as negative. That loses the
-    more the nearer it is, until the half-space takes over.
+    It still reaches below the horizon, where light counts as negative. With these receivers it loses 20.0 %,
+    8.7 % and -0.9 % of all their light; the bounds are a tenth above that. (Other seeds: 23 to 25, 10 to 15
+    and 1 %.) No receiver gets more than 0.09 too much, where the half-space takes over; the bound is 0.1.
     """
     receiver, normal = random_receivers(600, 2, reach)
     facing, slope = -(receiver * normal).sum(1), np.sqrt(1.0 - normal[:, 2] ** 2)
@@ -88,14 +89,15 @@ def test_cut_at_the_horizon(nearest, reach, off):
     expected = np.array([integral(receiver[i], normal[i], 1.0) for i in chosen])
     found = form(receiver[chosen], normal[chosen], 1.0)
     assert len(chosen) > 10
-    assert abs(found.sum() / expected.sum() - 1.0) < off
-    assert (found - expected).max() < 0.25
+    assert -lost < found.sum() / expected.sum() - 1.0 < 0.01
+    assert (found - expected).max() < 0.1
 
 
 def test_near_a_cut_disc_it_is_a_half_space():
-    """A wall that stands on the disc, within a tenth of its radius: no bias, and 0.12 of the radiosity RMS.
+    """Receivers of a wall that stands on the disc, within a tenth of its radius, to 0.02 and 0.05 RMS.
 
-    The disc of the part alone lost a quarter of the radiosity here.
+    They get 0.47 on average. The error is -0.011, 0.029 RMS; of other seeds, up to as much. The disc of the
+    part alone is off by -0.30, 0.31 RMS.
     """
     random = np.random.default_rng(3)
     count = 24
@@ -108,8 +110,8 @@ def test_near_a_cut_disc_it_is_a_half_space():
     expected = np.array([integral(r, n, 1.0, finer=4) for r, n in zip(receiver, normal, strict=True)])
     error = form(receiver, normal, 1.0) - expected
     assert expected.mean() > 0.2
-    assert abs(error.mean()) < 0.05
-    assert np.sqrt((error**2).mean()) < 0.12
+    assert abs(error.mean()) < 0.02
+    assert np.sqrt((error**2).mean()) < 0.05
 
 
 def test_share_and_centroid_of_a_part():
@@ -147,4 +149,4 @@ def test_gradients_are_finite_at_the_hard_points():
                                   for i, v in enumerate(values))  # fmt: skip
                 value, gradient = jax.value_and_grad(disc_form, argnums=(0, 1, 2, 3, 4))(*arguments)
                 assert np.isfinite(value) and value >= 0.0
-                assert np.isfinite(gradient[4]), (place, normal, radius)
+                assert np.isfinite(gradient).all(), (place, normal, radius)

@@ -29,11 +29,14 @@ def irradiances(runtime: Runtime, view: View, config: TunedConfig, rotations: in
 
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
-@pytest.mark.parametrize("density_importance", [pytest.param(0.5, marks=pytest.mark.slow), pytest.param(1.0)])
-def test_the_mean_over_rotations_is_the_same_light(room, light, density_importance):
-    """48 rotations of 256 VPLs give the image of 32,768: mean and middle pixel within 1.5 %.
+@pytest.mark.parametrize(
+    ("density_importance", "tolerance"), [pytest.param(0.5, 0.01, marks=pytest.mark.slow), (1.0, 0.015)]
+)
+def test_the_mean_over_rotations_is_the_same_light(room, light, density_importance, tolerance):
+    """48 rotations of 256 VPLs give the image of 32,768: mean and middle pixel within `tolerance`.
 
-    With η = 1 a twentieth of the VPLs is drawn by flux alone: what they find in the corner is left to chance.
+    With η = 0.5 the mean was off by up to 0.7 %, and the middle pixel by 0.5 %; with η = 1, by 1.1 and 0.9 %:
+    a twentieth of the VPLs is then drawn by flux alone, and what they find in the corner is left to chance.
 
     α is small, so that footprints, which depend on density, take little light away; pixels in corners, where
     1/d² then runs free, are noisy (RMS over all of them 2 to 16 %), so the middle one is looked at.
@@ -42,9 +45,9 @@ def test_the_mean_over_rotations_is_the_same_light(room, light, density_importan
     truth = irradiances(room, view, config_with(vpl_count=32768, falloff_footprint=0.05), 1)[0]
     config = config_with(vpl_count=256, falloff_footprint=0.05, density_importance=density_importance)
     mean = irradiances(room, view, config, 48).mean(axis=0)
-    assert mean.mean() == pytest.approx(truth.mean(), rel=1.5e-2)
+    assert mean.mean() == pytest.approx(truth.mean(), rel=tolerance)
     seen = truth > 0.0
-    assert np.median(np.abs(mean[seen] - truth[seen]) / truth[seen]) < 1.5e-2
+    assert np.median(np.abs(mean[seen] - truth[seen]) / truth[seen]) < tolerance
 
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)

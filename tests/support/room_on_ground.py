@@ -11,7 +11,7 @@ from vpltune.renderer.scene.views import View
 
 FILE = Path(__file__).resolve().parents[1] / "scenes" / "room_on_ground.gltf"
 WIDTH = 20.0
-"""Of the ground in the file, metres."""
+"""Width of the file's ground in metres."""
 
 
 def room_on_ground(width: float) -> Scene:

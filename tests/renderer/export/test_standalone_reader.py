@@ -141,9 +141,15 @@ def test_few_vpls_are_placed_as_the_runtime_places_them(tmp_path, light, placeme
     assert (np.abs(image - others.astype(int)).max(axis=-1) > 3).mean() > 0.1
 
 
-@pytest.mark.parametrize("file", sorted(READER.parent.glob("standalone_*")), ids=lambda file: file.name)
+READER_FILES = sorted(READER.parent.glob("standalone_*"))
+READER_LINES = 240
+"""Most lines of one file of the reader: four screens of 60, so that it can be read before it is ported. The
+longest, standalone_visibility.glsl, has some 20 fewer."""
+
+
+@pytest.mark.parametrize("file", READER_FILES, ids=lambda file: file.name)
 def test_the_reader_is_short(file):
-    assert len(file.read_text(encoding="utf-8").splitlines()) < 240
+    assert len(file.read_text(encoding="utf-8").splitlines()) <= READER_LINES
 
 
 def test_a_bundle_is_json_that_describes_its_bytes(tmp_path):

@@ -12,12 +12,11 @@ from pathlib import Path
 
 import psutil
 import pytest
+from quick_fit import QUICK_FIT
 
 from vpltune.__main__ import run
-from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig, write_config
 from vpltune.tuner.batch.record import Records
-from vpltune.tuner.fitting.fit_density import FEW_VPLS
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 # Choices: kills of Dask workers and schedulers, and files in the library.
@@ -38,7 +37,7 @@ def library(tmp_path_factory):
         renamed = content.replace(b'"generator":"VPLtune', b'"generator":"VPLtun%d' % index)
         (folder / f"scene{index}.glb").write_bytes(renamed)
     (folder / "none.glb").write_bytes(b"no scene")
-    write_config(folder / "small.json", TunedConfig(ArtistParameters(vpl_count=FEW_VPLS + 1)))
+    write_config(folder / "small.json", TunedConfig(QUICK_FIT))
     return folder
 
 

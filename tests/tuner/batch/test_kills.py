@@ -11,11 +11,10 @@ from pathlib import Path
 
 import psutil
 import pytest
+from quick_fit import QUICK_FIT
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig, write_config
 from vpltune.tuner.batch.record import Records
-from vpltune.tuner.fitting.fit_density import FEW_VPLS
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 # Choices: kills in all, and scenes in the library.
@@ -35,7 +34,7 @@ def library(tmp_path_factory):
         renamed = content.replace(b'"generator":"VPLtune', b'"generator":"VPLtun%d' % index)
         assert renamed != content
         (folder / f"scene{index}.glb").write_bytes(renamed)
-    write_config(folder / "small.json", TunedConfig(ArtistParameters(vpl_count=FEW_VPLS + 1)))
+    write_config(folder / "small.json", TunedConfig(QUICK_FIT))
     return folder
 
 

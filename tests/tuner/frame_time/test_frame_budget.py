@@ -68,7 +68,7 @@ def test_a_budget_below_the_cheapest_frame_is_refused(steady, prepared):
 def test_no_frame_settles_on_fewer_vpls_than_a_budget_must_have(steady, prepared):
     """2.35 ms would do for one VPL; four take 2.51, and that is the least that is asked of a budget."""
     budget = FrameBudget(prepared, START, (24, 18))
-    choice = Quality(1, rsm_resolution=256)
+    choice = Quality(interleave=1, rsm_resolution=256)
     assert budget._settle(choice, 2.65).vpl_count >= frame_budget.LEAST_COUNT
     with pytest.raises(InputError, match=r"no frame could be measured within 2\.3 ms; the fastest took 2\."):
         budget._settle(choice, 2.3)
@@ -104,9 +104,9 @@ def test_the_model_is_the_clock_and_is_kept(steady, prepared, monkeypatch):
     view, runtime = prepared.views[0].view, prepared.runtime
     model = measured_cost_model(prepared.scene, (view,), START, runtime)
     for choice in (
-        Quality(1, 16, rsm_resolution=1024),
-        Quality(4, 16, rsm_resolution=512),
-        Quality(2, 16, rsm_resolution=256),
+        Quality(interleave=1, map_size=16, rsm_resolution=1024),
+        Quality(interleave=4, map_size=16, rsm_resolution=512),
+        Quality(interleave=2, map_size=16, rsm_resolution=256),
     ):
         for count in (16, 100, 3000):
             drawn = replace(START, parameters=ArtistParameters(vpl_count=count), quality=choice)
@@ -128,8 +128,8 @@ def test_smaller_maps_scale_the_gather():
     costs = {1: {"vpl_gather": PassCost(1.0, 0.4)}}
     maps = {8: {"vpl_gather": PassCost(1.0, 0.3)}, 16: {"vpl_gather": PassCost(1.0, 0.4)}}
     model = CostModel(costs, maps, {1024: {}})
-    assert model.per_vpl(Quality(1, 8, rsm_resolution=1024)) == pytest.approx(0.3)
-    assert model.per_vpl(Quality(1, 16, rsm_resolution=1024)) == pytest.approx(0.4)
+    assert model.per_vpl(Quality(interleave=1, map_size=8, rsm_resolution=1024)) == pytest.approx(0.3)
+    assert model.per_vpl(Quality(interleave=1, map_size=16, rsm_resolution=1024)) == pytest.approx(0.4)
 
 
 def test_flags():
@@ -150,7 +150,7 @@ def test_flags():
 
 def test_the_next_command_draws_as_the_budget_did():
     """The config says how; only the size of the frames that were timed is a flag."""
-    quality = Quality(4, 8, rsm_resolution=256)
+    quality = Quality(interleave=4, map_size=8, rsm_resolution=256)
     budget = MetBudget(3.0, (64, 48), "planted")
     for drawn, size in ((replace(quality, budget=budget), " --size 64x48"), (quality, ""), (Quality(), "")):
         assert f"--config out/tuned.json -o out/tuned.png{size}\n" in shown_after(drawn) + "\n"

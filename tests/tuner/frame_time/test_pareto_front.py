@@ -27,7 +27,7 @@ class PlantedBudget(FrameBudget):
         self.errors, self.refused, self.interrupted_at = dict(errors), refused, interrupted_at
         self.fitted: list[float] = []
         self.timed: list[int] = []
-        self.default_choice = Quality(1, rsm_resolution=1024)
+        self.default_choice = Quality(interleave=1, rsm_resolution=1024)
         gather = {"vpl_gather": PassCost(1.0, 0.01)}
         self.costs = CostModel({1: gather}, {}, {self.default_choice.rsm_resolution: {}})
 

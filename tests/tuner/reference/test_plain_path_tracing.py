@@ -6,19 +6,29 @@ from vpltune.tuner.reference.indirect_irradiance import IndirectIrradiance
 from vpltune.tuner.reference.plain_path_tracing import PlainPathTracing
 from vpltune.tuner.reference.traced_scene import traced_scene
 
-SAMPLES = 256
-"""Samples per pixel and half."""
+SEEDS = 32
+SAMPLES = 16
+"""Samples per pixel and half, for each seed."""
 
 
-def test_the_mean_is_the_reference_s_and_the_noise_is_not_less(shapes):
-    """Tolerance: 24·18 pixels of 512 samples, whose spread is about their mean, know it to 0.2 %."""
+def test_the_mean_is_the_reference_s_and_the_noise_is_more(shapes):
+    """Means agree to 0.5 %: over four such sets of seeds, they differed by 0.04 to 0.17 %.
+
+    The variance is 1.83 to 1.86 times that of the reference estimator over the same sets; the bound is 1.7.
+    One pair of halves would not tell: a few pixels hold most of the variance.
+    """
     view = shapes.box_room_view((24, 18))
     traced = traced_scene(shapes.box_room())
-    means, noise = [], []
+    means, variances = [], []
     for estimator in (PlainPathTracing, IndirectIrradiance):
         tracer = estimator(traced.wavefront, traced.surfaces, traced.triangles, view)
-        half_a, half_b = sum(batch for _, batch in tracer.batches(0, SAMPLES, 3, 1)) / SAMPLES
-        means.append(float(half_a.mean() + half_b.mean()) / 2.0)
-        noise.append(float(np.mean((half_a - half_b) ** 2)))
-    assert abs(means[0] / means[1] - 1.0) < 0.01
-    assert noise[0] >= noise[1]
+        halves = np.array(
+            [
+                sum(batch for _, batch in tracer.batches(0, SAMPLES, seed, 1)) / SAMPLES
+                for seed in range(SEEDS)
+            ]
+        )
+        means.append(float(halves.mean()))
+        variances.append(float(np.mean((halves[:, 0] - halves[:, 1]) ** 2)) / 2.0)
+    assert abs(means[0] / means[1] - 1.0) < 5e-3
+    assert variances[0] > 1.7 * variances[1]

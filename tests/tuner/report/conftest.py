@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 from headless_chromium import headless_chromium
+from quick_fit import QUICK_FIT
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
 
 SCENE = Path(__file__).resolve().parents[3] / "configs" / "scenes" / "cornell-box.glb"
@@ -18,7 +18,7 @@ def fitted_folder(tmp_path_factory) -> Path:
     from vpltune.tuner.scene_fit.fit_scene import FitOptions, fit_scene
 
     folder = tmp_path_factory.mktemp("report") / "fit"
-    start = TunedConfig(ArtistParameters(vpl_count=257))
+    start = TunedConfig(QUICK_FIT)
     options = FitOptions(start=start, views=1, size=(64, 48), command="vpltune fit box.glb -o 'my out'")
     fit_scene(SCENE, folder, options, lambda stage, share: None)
     return folder

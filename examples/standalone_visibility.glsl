@@ -182,7 +182,7 @@ float rim_overlap(Texel met, vec3 offset, vec3 normal, vec3 axis) {
 // The overlap of a pixel and a plane that a corner extends to the pixel's direction.
 float corner_overlap(Texel met, vec3 offset, vec3 normal, vec3 axis) {
     if (dot(offset, normal) >= 0.0) { return rim_overlap(met, offset, normal, axis); }
-    bool before = dot(met.end - offset, normal) > 1e-4 * length(offset);
+    bool before = dot(met.end - offset, normal) > -1e-4 * length(offset);
     return before ? dot(met.end - offset, met.plane) / length(offset) : -1.0;
 }
 

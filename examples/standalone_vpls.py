@@ -98,14 +98,24 @@ def drawn(atlas, weight, bundle, count):
     lit = (window // size == at[:, None] // size).all(-1) & (flux[around] > 0)
     draws = count * (weight[around] * lit).sum(1)[:, None] / rows[-1]
     near = (atlas[around] * lit[..., None]).sum(1) / draws
-    # It slides with the position inside the texel, over the plane of the texel's surface.
+    # It slides with the position inside the texel, over the texel's surface, but not over its edge.
+    position, normal = atlas[row, column, :3], atlas[row, column, 4:7]
+    inside = np.stack([right, up], axis=1)
+    for axis in (0, 1):
+        beside = at.copy()
+        beside[:, 1 - axis] += np.where(inside[:, axis] < 0.5, -1, 1)
+        other = atlas[tuple(np.moveaxis(beside % weight.shape, -1, 0))]
+        between = other[:, :3] - position
+        goes_on = (beside // size == at // size).all(1) & (other[:, 8:11].mean(-1) > 0)
+        goes_on &= (other[:, 4:7] * normal).sum(1) > 0.9
+        goes_on &= abs((between * normal).sum(1)) < 0.1 * np.linalg.norm(between, axis=1)
+        inside[~goes_on, axis] = 0.5
     faces = [rsm["faces"][number] for number in row // size * (weight.shape[1] // size) + column // size]
     to_world, extent = (np.array([face[key] for face in faces]) for key in ("light_to_world", "extent"))
     flat = np.array([[face["orthographic"]] for face in faces])
-    place = np.stack([column % size + right, row % size + up], axis=1) * 2 / size - 1
+    place = (np.stack([column, row], axis=1) % size + inside) * 2 / size - 1
     across = np.einsum("nij,nj->ni", to_world[:, :3, :2], place * extent)
     start, ray = to_world[:, :3, 3] + across * flat, across * ~flat - to_world[:, :3, 2]
-    position, normal = atlas[row, column, :3], atlas[row, column, 4:7]
     along = (normal * ray).sum(1, keepdims=True)
     slid = start + ray * ((normal * (position - start)).sum(1, keepdims=True) / along)
     position = np.where(along > -0.02 * np.linalg.norm(ray, axis=1, keepdims=True), position, slid)

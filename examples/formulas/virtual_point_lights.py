@@ -7,6 +7,7 @@ import numpy as np
 from examples.formulas.reflective_shadow_map import MIN_COSINE, RsmTexels, texel_rays
 from examples.formulas.vectors import dot, length
 
+SAME_SURFACE_COSINE, SAME_SURFACE_SLOPE = 0.9, 0.1
 DARK_NORMAL = np.array([0.0, 0.0, 1.0])
 
 
@@ -70,8 +71,28 @@ def _draw(texels, face, weights, in_row, of_rows, point, count, filtering):
     flux = texels.flux[window][lit].sum(axis=0) / draws
     position, normal = texels.position[row, column], texels.normal[row, column]
     if filtering > 1:
+        towards = np.where(within < 0.5, -1, 1)
+        slides = (
+            _goes_on(texels, row, column, row, column + towards[0]),
+            _goes_on(texels, row, column, row + towards[1], column),
+        )
+        within = np.where(slides, within, 0.5)
         position = _on_plane(face, position, normal, np.array([column, row]) + within)
     return position, normal, np.sqrt(area / np.pi), flux
+
+
+def _goes_on(texels: RsmTexels, row: int, column: int, other_row: int, other_column: int) -> bool:
+    """Whether a texel's surface goes on into the one beside it."""
+    rows, columns = texels.mean_flux.shape
+    if not (0 <= other_row < rows and 0 <= other_column < columns):
+        return False
+    normal, other = texels.normal[row, column], (other_row, other_column)
+    between = texels.position[other] - texels.position[row, column]
+    return bool(
+        texels.mean_flux[other] > 0.0
+        and dot(texels.normal[other], normal) > SAME_SURFACE_COSINE
+        and abs(dot(between, normal)) < SAME_SURFACE_SLOPE * length(between)
+    )
 
 
 def _on_plane(face: dict, position: np.ndarray, normal: np.ndarray, place: np.ndarray) -> np.ndarray:

@@ -73,7 +73,7 @@ def corner_overlap(end, end_normal, receiver, receiver_normal) -> float:
     """`overlap` with a plane that a corner extends to the receiver's direction."""
     if not dot(receiver, receiver_normal) < 0.0:
         return rim_overlap(end, end_normal, receiver, receiver_normal)
-    if not dot(end - receiver, receiver_normal) > ROUNDING * length(receiver):
+    if not dot(end - receiver, receiver_normal) > -ROUNDING * length(receiver):
         return -1.0
     return float(dot(end - receiver, end_normal) / length(receiver))
 

@@ -27,6 +27,23 @@ int column_above(int row, int last, float target) {
     return low;
 }
 
+// Choices: a texel beside another shows the same surface if its normal is within 26° and its position is within a tenth
+// of the distance from the plane. Where that is not so, a VPL that does not slide flickers and is no more wrong.
+const float SAME_SURFACE_COSINE = 0.9;
+const float SAME_SURFACE_SLOPE = 0.1;
+
+// Whether a surface goes on into the texel `beside` its own, in the tile from `low` to `high`.
+bool goes_on(RsmTexel surface, ivec2 beside, ivec2 low, ivec2 high) {
+    if (any(lessThan(beside, low)) || any(greaterThan(beside, high))) {
+        return false;
+    }
+    RsmTexel other = rsm_texel(beside);
+    vec3 between = other.position_world - surface.position_world;
+    return mean_flux(other.flux) > 0.0
+        && dot(other.normal_world, surface.normal_world) > SAME_SURFACE_COSINE
+        && abs(dot(between, surface.normal_world)) < SAME_SURFACE_SLOPE * length(between);
+}
+
 // A VPL at a texel, with the mean flux and area of the RSM_FILTERING² texels around it, within its face. It then has
 // the colour of its surroundings and not of one texel, which would flicker as the light moves. The mean is
 // sum(flux) / sum(weight), which conserves energy; for texels of equal probability it is the plain mean.
@@ -59,7 +76,12 @@ VirtualPointLight texel_vpl(ivec2 texel, vec2 within) {
     area /= draws;
 #if RSM_FILTERING > 1
     // The rest of the table's point after the inversion gives the position inside the texel. As the light moves or the
-    // density changes, the VPL slides over the surface and does not jump between texel centres.
+    // density changes, the VPL slides over the surface and does not jump between texel centres. It does not slide over
+    // the surface's edge: beyond a wall's foot it would light what is behind the wall.
+    ivec2 tile_high = tile_low + RSM_RESOLUTION - 1;
+    ivec2 towards = ivec2(within.x < 0.5 ? -1 : 1, within.y < 0.5 ? -1 : 1);
+    within.x = goes_on(surface, texel + ivec2(towards.x, 0), tile_low, tile_high) ? within.x : 0.5;
+    within.y = goes_on(surface, texel + ivec2(0, towards.y), tile_low, tile_high) ? within.y : 0.5;
     surface.position_world = rsm_position_on_plane(surface, vec2(texel) + within);
 #endif
     return VirtualPointLight(

@@ -127,14 +127,15 @@ bool is_behind(MetSurface met, MetSurface other) {
 }
 
 // The overlap of a receiver with a surface that reaches as far as the receiver's direction, because a corner does: the
-// height of the receiver behind the surface's plane, if the hit is in front of the receiver's tangent plane at all.
+// height of the receiver behind the surface's plane, unless the hit is behind the receiver's tangent plane. In that
+// plane it may be the corner itself.
 float corner_overlap(MetSurface met, vec3 receiver, vec3 receiver_normal) {
     if (!(dot(receiver, receiver_normal) < 0.0)) {
         return rim_overlap(met, receiver, receiver_normal);
     }
     vec3 between = met.end - receiver;
     float share = inversesqrt(dot(receiver, receiver));
-    return dot(between, receiver_normal) * share > VISIBILITY_ROUNDING ? dot(between, met.normal) * share : -1.0;
+    return dot(between, receiver_normal) * share > -VISIBILITY_ROUNDING ? dot(between, met.normal) * share : -1.0;
 }
 
 // The overlap of a receiver with the planes of its own texel's hit and of three around it. A plane counts if none of the

@@ -217,7 +217,7 @@ class _Lookup:
 
         def corner(other: Array, other_normal: Array) -> Array:
             between = other - receiver
-            reaches = _dot(between, normal) > VISIBILITY_ROUNDING * distance
+            reaches = _dot(between, normal) > -VISIBILITY_ROUNDING * distance
             hidden = jnp.where(reaches, _dot(between, other_normal), -distance)
             return jnp.where(away < 0.0, hidden, rim(other, other_normal))
 

@@ -18,6 +18,8 @@ from vpltune.renderer.scene.scene import scaled
 from vpltune.renderer.scene.views import scaled_view
 
 BASE = ArtistParameters(vpl_count=64, screen_space_radius=5.0)
+POINTS = dataclasses.replace(BASE, lloyd_iterations=0)
+"""Clusters go on from frame to frame in a clip; points do not."""
 QUALITY = Quality(rsm_resolution=128, adaptation_frames=2.0)
 CONFIG = TunedConfig(BASE, visibility="maps", auto=made_prior(), quality=QUALITY)
 GENTLE = dataclasses.replace(CONFIG, auto=made_prior(strength=0.2))
@@ -84,13 +86,14 @@ def test_a_still_takes_what_it_asks_for(runtime):
 def test_an_eased_frame_moves_by_little(runtime):
     """The first frame is exact; then no step is larger than the bound, each goes the target's way, and the
     target is reached."""
-    start, goal = (drawn_places(runtime, room_view(light), GENTLE) for light in ("spot", "wide_spot"))
+    gentle = dataclasses.replace(GENTLE, parameters=POINTS)
+    start, goal = (drawn_places(runtime, room_view(light), gentle) for light in ("spot", "wide_spot"))
     assert np.abs(goal - start).max() > 4.0 * LARGEST_STEP
     state = ClipState()
-    here = drawn_places(runtime, room_view("spot"), GENTLE, state)
+    here = drawn_places(runtime, room_view("spot"), gentle, state)
     np.testing.assert_allclose(here, start, atol=1e-6)
     for _ in range(60):
-        there = drawn_places(runtime, room_view("wide_spot"), GENTLE, state)
+        there = drawn_places(runtime, room_view("wide_spot"), gentle, state)
         # 2e-6: places are found again from float32 values.
         assert np.abs(there - here).max() <= LARGEST_STEP + 2e-6
         assert ((there - here) * (goal - here) >= -1e-9).all()
@@ -100,7 +103,7 @@ def test_an_eased_frame_moves_by_little(runtime):
 
 def test_a_clip_without_a_time_constant_follows_at_once(runtime):
     config = dataclasses.replace(CONFIG, quality=dataclasses.replace(QUALITY, adaptation_frames=0.0))
-    state = ClipState()
+    config, state = dataclasses.replace(config, parameters=POINTS), ClipState()
     for light in ("spot", "wide_spot", "spot"):
         np.testing.assert_array_equal(
             drawn_places(runtime, room_view(light), config, state),
@@ -152,8 +155,8 @@ def test_a_still_between_two_frames_of_a_clip_is_not_eased(runtime):
     np.testing.assert_array_equal(drawn_places(runtime, room_view("wide_spot"), GENTLE), still)
 
 
-def test_a_clip_of_a_config_without_a_prior_is_a_row_of_stills(runtime):
-    config, state = CONFIG.with_parameters(BASE), ClipState()
+def test_a_clip_of_points_without_a_prior_is_a_row_of_stills(runtime):
+    config, state = CONFIG.with_parameters(POINTS), ClipState()
     for light in ("spot", "point", "spot"):
         np.testing.assert_array_equal(
             runtime.render_radiance(room_view(light), config, state),

@@ -24,7 +24,7 @@ def config_with(**parameters) -> TunedConfig:
 
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
-@pytest.mark.parametrize("density_exponent", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("density_exponent", [0.0, pytest.param(0.5, marks=pytest.mark.slow), 1.0])
 def test_filtering_keeps_energy(gl_context, light, density_exponent):
     """Total VPL flux is the RSM's, however many texels a VPL looks at; with γ = 1 it is so for each VPL.
 

@@ -63,6 +63,7 @@ def test_the_shadow_goes_with_the_board(gl_context, with_maps):
     assert centers[-1] - centers[0] > 0.5 * way
 
 
+@pytest.mark.slow
 def test_flicker_is_bounded(gl_context, with_maps):
     """Images change from frame to frame by at most 1.1 times as much as with maps of 64² texels.
 

@@ -28,9 +28,18 @@ def irradiances(runtime: Runtime, view: View, config: TunedConfig, rotations: in
     return np.array([frame.indirect_irradiance[frame.valid] for frame in frames], np.float64)
 
 
-@pytest.mark.parametrize("light", ROOM_LIGHTS)
 @pytest.mark.parametrize(
-    ("density_importance", "tolerance"), [pytest.param(0.5, 0.01, marks=pytest.mark.slow), (1.0, 0.015)]
+    ("density_importance", "tolerance", "light"),
+    [
+        pytest.param(
+            importance,
+            tolerance,
+            light,
+            marks=() if importance == 1.0 and light in ("spot", "directional") else pytest.mark.slow,
+        )
+        for importance, tolerance in ((0.5, 0.01), (1.0, 0.015))
+        for light in ROOM_LIGHTS
+    ],
 )
 def test_the_mean_over_rotations_is_the_same_light(room, light, density_importance, tolerance):
     """48 rotations of 256 VPLs give the image of 32,768: mean and middle pixel within `tolerance`.
@@ -115,6 +124,7 @@ def test_a_dark_view_is_no_error(room):
     assert np.isfinite(frame.vpl_flux).all()
 
 
+@pytest.mark.slow
 def test_near_field_follows_importance(room):
     """The screen-space term knows the footprints that VPLs have: energy stays with and without importance.
 

@@ -62,7 +62,7 @@ class Soak:
         return self.runtime.render_radiance(moment.view, self.config, lights=lights).copy()
 
 
-@pytest.mark.parametrize("frames", [300, pytest.param(10_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("frames", [100, pytest.param(10_000, marks=pytest.mark.slow)])
 def test_soak(gl_context, frames):
     """Growth may be 1 MiB: a hundred bytes left behind by each frame, or one texture by them all."""
     soak = Soak(gl_context)

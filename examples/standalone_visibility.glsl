@@ -141,7 +141,10 @@ void main() {
         marks[i] = corner_mark(texel, start, frame);
         for (int k = 0; k < 9; ++k) {
             ivec2 beside = clamp(texel + ivec2(k % 3, k / 3) - 1, ivec2(0), ivec2(map_size - 1));
-            if (hides(texel, beside, start, frame) || hides(beside, texel, start, frame)) { marks[i] |= 8u; }
+            bool met = maps[start + i].w < 1e5 * scene_length;
+            bool other_met = maps[start + beside.y * map_size + beside.x].w < 1e5 * scene_length;
+            bool hidden = hides(texel, beside, start, frame) || hides(beside, texel, start, frame);
+            if (met != other_met || hidden) { marks[i] |= 8u; }
         }
     }
     barrier();

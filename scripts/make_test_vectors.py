@@ -331,8 +331,9 @@ def _cast(vpl: dict, size: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def map_vpl() -> dict[str, Any]:
-    """The VPL whose map is made: the first of the gather's."""
-    return dict(zip(("position", "normal", "footprint"), map(np.array, VPLS[0]), strict=False))
+    """The VPL whose map is made: near the first of the gather's, from where no ray runs along an edge."""
+    vpl = dict(zip(("position", "normal", "footprint"), map(np.array, VPLS[0]), strict=False))
+    return vpl | {"position": vpl["position"] + [0.003, 0.0, 0.007]}
 
 
 def _visibility() -> dict[str, Any]:

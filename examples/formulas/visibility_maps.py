@@ -116,7 +116,7 @@ def seen_share(overlapping, bias: float, softness: float) -> np.ndarray:
 
 
 def is_silhouette(end: np.ndarray, normal: np.ndarray, farthest: float) -> np.ndarray:
-    """[row, column]: whether what a texel met hides what a neighbour met, or the other way round.
+    """[row, column]: whether a texel and a neighbour hide one another, or one of the two met nothing.
 
     Args:
         end, normal: [row, column, 3] what each texel's ray met.
@@ -134,7 +134,8 @@ def is_silhouette(end: np.ndarray, normal: np.ndarray, farthest: float) -> np.nd
         is_hidden = (overlap(others, other_normals, own, own_normal) > LEAST_OVERLAP) & (
             length(own) < farthest
         )
-        result[row, column] = (hides_other | is_hidden).any()
+        one_misses = (length(own) < farthest) != (length(others) < farthest)
+        result[row, column] = (hides_other | is_hidden | one_misses).any()
     return result
 
 

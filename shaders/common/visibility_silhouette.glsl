@@ -1,5 +1,6 @@
 // Silhouettes in a visibility map. One runs through a texel if the surface that its ray hit shades the surface that a
-// neighbour's ray hit, or the other way round. There, one ray says too little. The corner of a room, or the edge of a
+// neighbour's ray hit, or the other way round, and where one of the two rays hits nothing: a receiver in the texel may be
+// inside of what the other one hits. There, one ray says too little. The corner of a room, or the edge of a
 // box that faces the VPL, hides nothing and is no silhouette. A concave corner, such as a room's or a wall's foot, hides
 // what is behind it: no texel is finer for it, but it is marked.
 //
@@ -16,7 +17,7 @@ bool hides(MetSurface nearer, MetSurface farther, float farthest) {
     return length(farther.end) < farthest && surface_overlap(nearer, farther.end, farther.normal) > LEAST_OVERLAP;
 }
 
-// Whether a texel and any of its eight neighbours hide one another.
+// Whether a texel and any of its eight neighbours hide one another, or one hits something and the other nothing.
 bool is_silhouette(ivec2 texel, float farthest) {
     MetSurface own = met_surface(SILHOUETTE_ENTRY(texel), texel, VISIBILITY_MAP_SIZE);
     ivec2 last = min(texel + 1, ivec2(VISIBILITY_MAP_SIZE - 1));
@@ -24,7 +25,8 @@ bool is_silhouette(ivec2 texel, float farthest) {
         for (int x = max(texel.x - 1, 0); x <= last.x; ++x) {
             ivec2 beside = ivec2(x, y);
             MetSurface other = met_surface(SILHOUETTE_ENTRY(beside), beside, VISIBILITY_MAP_SIZE);
-            if (hides(own, other, farthest) || hides(other, own, farthest)) {
+            bool one_misses = (length(own.end) < farthest) != (length(other.end) < farthest);
+            if (one_misses || hides(own, other, farthest) || hides(other, own, farthest)) {
                 return true;
             }
         }

@@ -155,14 +155,20 @@ def test_more_vpls_keep_the_mean(gl_context, light):
 
 
 def test_finer_texels_lie_at_silhouettes_alone(gl_context):
-    """A room with a board in it has some refined texels. A floor with a wall, which is convex, has none."""
-    room, corner = (
-        Runtime(scene, context=gl_context).capture(room_view("spot"), MAPS).visibility_maps
-        for scene in (colored_room(), walled_scene(False))
+    """A room with a board has refined texels, and so has an open floor, at the sky. A closed room has none."""
+    inside = Camera(look_at(np.array([0.0, 0.0, 0.9]), np.zeros(3)), 1.2)
+    room = colored_room()
+    front = quad((-1, -1, 1), (0, 2, 0), (2, 0, 0), 0, "front")
+    closed = scene_of([*room.meshes[:-1], front], [tuple(each.base_color) for each in room.materials])
+    view = room_view("spot")
+    boarded, open_to_the_sky, alone = (
+        Runtime(scene, context=gl_context).capture(seen, MAPS).visibility_maps
+        for scene, seen in ((room, view), (walled_scene(False), view), (closed, replace(view, camera=inside)))
     )
-    assert 0.01 < (room.block >= 0).mean() < 0.2
-    assert len(room.block_distance) == (room.block >= 0).sum()
-    assert not (corner.block >= 0).any()
+    for maps in (boarded, open_to_the_sky):
+        assert 0.01 < (maps.block >= 0).mean() < 0.2
+        assert len(maps.block_distance) == (maps.block >= 0).sum()
+    assert not (alone.block >= 0).any()
 
 
 def test_refined_maps_are_nearly_maps_so_much_finer(gl_context):

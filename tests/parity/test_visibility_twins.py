@@ -155,7 +155,7 @@ def test_more_vpls_keep_the_mean(gl_context, light):
 
 
 def test_finer_texels_lie_at_silhouettes_alone(gl_context):
-    """A room with a board has refined texels, and so has an open floor, at the sky. A closed room has none."""
+    """A room with a board has refined texels, and so has an open floor at the sky. A closed room has none."""
     inside = Camera(look_at(np.array([0.0, 0.0, 0.9]), np.zeros(3)), 1.2)
     room = colored_room()
     front = quad((-1, -1, 1), (0, 2, 0), (2, 0, 0), 0, "front")

@@ -23,3 +23,13 @@ bool is_marked(int vpl_index, ivec2 texel, int reach) {
     }
     return false;
 }
+
+// The number of marked texels of a map.
+int marked_texels(int vpl_index) {
+    int count = 0;
+    for (int y = 0; y < VISIBILITY_MAP_SIZE; ++y) {
+        uvec2 row = visibility_marks[vpl_index * VISIBILITY_MAP_SIZE + y];
+        count += bitCount(row.x) + bitCount(row.y);
+    }
+    return count;
+}

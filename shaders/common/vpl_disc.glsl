@@ -51,7 +51,7 @@ vec3 disc_vector(vec3 to_vpl, vec3 normal, vec3 vpl_normal, float radius) {
     float slope = sqrt(max(1.0 - between * between, 1e-12));
     float above = dot(normal, to_vpl) / (slope * radius);
     vec2 part = disc_past_chord(above);
-    float fade = min(2.0 * height / DISC_FADE_HEIGHT - 1.0, 1.0);
+    float fade = min(2.0 * height / (DISC_FADE_HEIGHT * radius) - 1.0, 1.0);
     if (!(fade > 0.0) || part.x < DISC_LEAST_PART) {
         return vec3(0.0);
     }

@@ -16,6 +16,10 @@ shared uvec2 whole_map[TEXELS];  // a copy as cast: other invocations overwrite 
 #include "common/visibility_marks.glsl"
 #include "common/visibility_workgroup.glsl"
 
+// A choice: where a map has so few texels that receivers may look up, all that the camera sees is a few texels wide to the
+// VPL, and may lie between two rays. Each of these texels is cast finer.
+const int FEW_LOOKED_UP = 8;
+
 layout(local_size_x = 64) in;
 
 uniform float longest;  // the scene's diagonal [world units]
@@ -30,6 +34,7 @@ void main() {
         whole_map[i] = visibility_maps[start + i];
     }
     barrier();
+    bool few_looked_up = marked_texels(vpl_index) <= FEW_LOOKED_UP;
     float farthest = VISIBILITY_FARTHEST * longest / scene_length;
     for (int i = int(gl_LocalInvocationIndex); i < TEXELS; i += 64) {
         ivec2 texel = ivec2(i % VISIBILITY_MAP_SIZE, i / VISIBILITY_MAP_SIZE);
@@ -38,7 +43,7 @@ void main() {
         }
         visibility_maps[start + i].x |= corner_mark(texel, farthest);
 #if VISIBILITY_BLOCKS > 0
-        if (!is_silhouette(texel, farthest)) {
+        if (!few_looked_up && !is_silhouette(texel, farthest)) {
             continue;
         }
         uint block = atomicAdd(visibility_edge_count, 1u);

@@ -67,7 +67,7 @@ def disc_form(
     slope = jnp.sqrt(jnp.maximum(1.0 - between**2, 1e-12))
     above = facing / (slope * radius)
     share, offset = disc_past_chord(above)
-    fade = jnp.minimum(2.0 * height / FADE_HEIGHT - 1.0, 1.0)
+    fade = jnp.minimum(2.0 * height / (FADE_HEIGHT * radius) - 1.0, 1.0)
     lit = (fade > 0.0) & (share >= LEAST_PART)
     height = jnp.maximum(height, 0.0)
     share = jnp.maximum(share, LEAST_PART)

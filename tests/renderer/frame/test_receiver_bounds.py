@@ -19,6 +19,8 @@ QUALITY = Quality(interleave=1, rsm_resolution=128)
 POINTS = TunedConfig(ArtistParameters(vpl_count=48, lloyd_iterations=0), quality=QUALITY)
 DISCS = replace(POINTS, parameters=replace(POINTS.parameters, lloyd_iterations=1))
 INTERLEAVED = replace(DISCS, quality=replace(QUALITY, interleave=4))
+FEW_LOOKED_UP = 8
+"""Of shaders/vpl_visibility_maps/vpl_visibility_edges.comp."""
 SIZE = (50, 38)
 """No multiple of a tile."""
 
@@ -83,7 +85,9 @@ def test_generated_scenes_lose_nothing(gl_context, monkeypatch, number):
     # The lowest bits of a distance mark corners with neighbours, which may not have been cast.
     same = np.isclose(maps.distance, complete.distance, rtol=2e-6) & (maps.normal == complete.normal).all(-1)
     assert (same | (maps.distance == nothing))[both].all()
-    assert (complete.block >= 0)[maps.block >= 0].all()
+    # Where few texels are looked up, all of them are finer.
+    few = (maps.block >= 0).sum((1, 2), keepdims=True) <= FEW_LOOKED_UP
+    assert (complete.block >= 0)[(maps.block >= 0) & ~few].all()
     assert same.mean() < 0.9
 
 

@@ -38,8 +38,8 @@ def brought_forward(document: dict[str, Any], where: str) -> dict[str, Any]:
                 raise InputError(f"{where}: parameters: key '{older}' is missing")
         forward["parameters"] = {OLDER_NAMES.get(key, key): value for key, value in parameters.items()}
         iterations = forward["parameters"].pop("lloyd_iterations")
-        # Version 1 had no other way to draw.
-        forward["quality"] = {"lloyd_iterations": iterations, "interleave": 1}
+        # What version 1 drew with.
+        forward["quality"] = {"lloyd_iterations": iterations, "interleave": 1, "map_size": 24}
         if document.get("visibility") == "none":
             forward["visibility"] = "transmittance"
             forward["parameters"]["extinction_coefficient"] = 0.0

@@ -51,7 +51,7 @@ class Quality:
     joins them. 1 gathers every VPL at every pixel, as the tuner's surrogate does. `auto` follows the frame's
     size by `AUTO_INTERLEAVE`. With fewer VPLs than pixels in a block, blocks are smaller."""
 
-    map_size: int = 24
+    map_size: int = 32
     """Texels along the side of a VPL's visibility map, in [4, 64]."""
 
     map_refinement: int = 4

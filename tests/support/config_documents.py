@@ -6,7 +6,7 @@ from typing import Any
 from hypothesis import strategies as st
 
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters, parameter_spec
-from vpltune.renderer.config.quality import INTERLEAVES, LARGEST_SIDE, MAP_REFINEMENTS
+from vpltune.renderer.config.quality import INTERLEAVES, LARGEST_SIDE, MAP_REFINEMENTS, Quality
 from vpltune.renderer.config.tuned_config import VISIBILITIES
 
 
@@ -20,6 +20,10 @@ def plain_parameters(**changes: Any) -> dict[str, Any]:
 def document(**changes: Any) -> dict[str, Any]:
     """The shortest config file of version 2, with some keys changed or added."""
     return {"format": "vpltune", "version": 2, "parameters": plain_parameters()} | changes
+
+
+OLDER_QUALITY = Quality(interleave=1, map_size=24)
+"""What version 1 drew with."""
 
 
 def older_document(**changes: Any) -> dict[str, Any]:

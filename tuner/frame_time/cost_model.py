@@ -29,7 +29,7 @@ FRAMES = 5
 """Frames timed at each VPL count, of which the median is taken. A choice."""
 INTERLEAVES = (1, 2, 4)
 """Values of `Quality.interleave` to choose from. A choice; `default_choice` has the first one."""
-MAP_SIZES = (8, 16, 24)
+MAP_SIZES = (8, 16, 32)
 """Values of `Quality.map_size` to choose from. A choice."""
 RSM_DIVISORS = (1, 2, 4)
 """The runtime's own RSM resolution over these gives the ones to choose from. A choice."""

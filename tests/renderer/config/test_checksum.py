@@ -4,7 +4,7 @@ import json
 import re
 
 import pytest
-from config_documents import any_document, document, older_document
+from config_documents import OLDER_QUALITY, any_document, document, older_document
 from hypothesis import given, settings
 from made_priors import made_prior
 from point_vpls import point_vpls
@@ -170,5 +170,5 @@ def test_a_config_in_a_gltf_file_is_checked_too(tmp_path):
 
 def test_an_older_file_has_none_and_its_successor_has():
     config = parse_config(json.dumps(older_document()), "text")
-    points = TunedConfig(point_vpls(), quality=Quality(interleave=1))
+    points = TunedConfig(point_vpls(), quality=OLDER_QUALITY)
     assert written(config)["checksum"] == written(points)["checksum"]

@@ -5,7 +5,14 @@ import math
 from dataclasses import replace
 
 import pytest
-from config_documents import any_parameters, document, older_document, older_parameters, plain_parameters
+from config_documents import (
+    OLDER_QUALITY,
+    any_parameters,
+    document,
+    older_document,
+    older_parameters,
+    plain_parameters,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_priors import made_prior
@@ -13,7 +20,6 @@ from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.config_versions import OLDER_NAMES, brought_forward
-from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import (
     VERSION,
     FitNote,
@@ -29,7 +35,7 @@ def read(changed: dict) -> TunedConfig:
     return parse_config(json.dumps(changed), "older.json")
 
 
-POINTS = TunedConfig(point_vpls(), quality=Quality(interleave=1))
+POINTS = TunedConfig(point_vpls(), quality=OLDER_QUALITY)
 """What version 1 drew by default: points, of which every pixel gathers all."""
 
 
@@ -61,7 +67,7 @@ def test_the_document_itself():
         parameters=plain_parameters(
             falloff_footprint=0.5, extinction_coefficient=0.75, vpl_count=1024, density_importance=0.0
         ),
-        quality={"lloyd_iterations": 6, "interleave": 1},
+        quality={"lloyd_iterations": 6, "interleave": 1, "map_size": 24},
         provenance={"scene": "box.glb", "seed": 7},
         fit={"status": "improved", "sentence": "relMSE fell"},
     )
@@ -75,8 +81,9 @@ def test_every_older_file_is_read_and_written_as_version_2(values, visibility):
     for before, now in OLDER_NAMES.items():
         older[before] = older.pop(now)
     config = read(older_document(parameters=older, visibility=visibility))
-    full = Quality(interleave=1)
-    assert config == TunedConfig(ArtistParameters.validated(values), visibility=visibility, quality=full)
+    assert config == TunedConfig(
+        ArtistParameters.validated(values), visibility=visibility, quality=OLDER_QUALITY
+    )
     text = config_text(config)
     assert json.loads(text)["version"] == VERSION == 2
     assert parse_config(text, "newer.json") == config

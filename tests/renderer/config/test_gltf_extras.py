@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from config_documents import older_document
+from config_documents import OLDER_QUALITY, older_document
 from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.gltf_extras import EXTRAS_KEY, read_gltf_extras, write_gltf_extras
-from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, config_text, read_config
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.files import read_scene
@@ -115,7 +114,7 @@ def test_a_scene_without_a_config_and_one_with_a_bad_one(tmp_path):
 
 def test_an_older_config_in_a_scene_is_read(tmp_path):
     write_gltf_extras(SCENES / "cornell-box.glb", tmp_path / "older.glb", older_document(visibility="none"))
-    points = TunedConfig(point_vpls(), visibility="transmittance", quality=Quality(interleave=1))
+    points = TunedConfig(point_vpls(), visibility="transmittance", quality=OLDER_QUALITY)
     assert read_config(tmp_path / "older.glb") == points
 
 

@@ -29,7 +29,7 @@ _LARGEST_SHARE = 0.4
 """Share of the texels that may be refined. 3 to 12 % of a room's texels are at a silhouette, 28 % in the
 busiest of sixteen scenes. Beyond that, texels stay coarse, and which ones may differ from frame to frame."""
 _MOST_DETAIL_BYTES = 1 << 27
-"""Bytes that every driver takes in one storage buffer: with blocks of 4², about 18,000 default maps of a
+"""Bytes that every driver takes in one storage buffer: with blocks of 4², about 10,000 default maps of a
 room."""
 
 

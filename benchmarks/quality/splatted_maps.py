@@ -18,11 +18,10 @@ from jaxtyping import Float64, Int64
 
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import present_scenes
-from benchmarks.quality.visibility_quality import ray_visibility
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.scene.scene import Scene, transform_points
-from vpltune.tuner.evaluation.evaluate import surrogate_irradiance
+from vpltune.tuner.evaluation.evaluate import surrogate_irradiance, traced_visibility
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene, SceneOptions, Stopwatch, prepare_scene
 from vpltune.tuner.metrics.view_metrics import relmse
 from vpltune.tuner.surrogate.captured_view import CapturedView, runtime_irradiance
@@ -102,7 +101,7 @@ def _scene_rows(name: str, prepared: PreparedScene) -> list[Row]:
         by_depth.append([_error(view, seen) for seen in _seen_by_depth(view, texels)])
         drawn = runtime_irradiance(prepared.runtime, CONFIG, view)
         cast.append(relmse(drawn[view.valid], view.reference.irradiance[view.valid]))
-        traced.append(_error(view, ray_visibility(prepared, view)))
+        traced.append(_error(view, traced_visibility(prepared.scene, view)))
     ours = float(np.mean(cast))
     return [
         Row(f"{name}_splatted", float(np.mean(by_plane)), "1", "cast maps", ours),

@@ -24,12 +24,11 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.atomic_file import write_text_whole
-from vpltune.tuner.evaluation.evaluate import SPLITS, surrogate_irradiance
+from vpltune.tuner.evaluation.evaluate import SPLITS, surrogate_irradiance, traced_visibility
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene, SceneOptions, Stopwatch, prepare_scene
 from vpltune.tuner.fitting.fit_placement import fit_placement
 from vpltune.tuner.fitting.fit_views import robust_errors
 from vpltune.tuner.metrics.view_metrics import mean_metrics
-from vpltune.tuner.reference import ray_traced_visibility
 from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views, runtime_irradiance
 
 VPLS = 256
@@ -74,7 +73,7 @@ def scene_figures(path: Path) -> Figures:
     options = SceneOptions(views=FITTED_VIEWS)
     prepared = prepare_scene(path, options, CONFIGS["maps"], Stopwatch(), lambda stage, share: None)
     figures = {mode: _drawn_figures(prepared, mode) for mode in CONFIGS}
-    seen = {view.view.name: ray_visibility(prepared, view) for view in prepared.views}
+    seen = {view.view.name: traced_visibility(prepared.scene, view) for view in prepared.views}
     fitted = _of_fitted(prepared.views)
     of_rays = [seen[view.view.name] for view in fitted]
     tuned = fit_placement(fitted, DEFAULT, robust_errors(fitted), visibility=of_rays).parameters
@@ -130,18 +129,6 @@ def _drawn_figures(prepared: PreparedScene, mode: str) -> dict[str, dict[str, di
 
 def _of_fitted(views: tuple[CapturedView, ...]) -> tuple[CapturedView, ...]:
     return tuple(view for view in views if view.view.split == "fitted")
-
-
-def ray_visibility(prepared: PreparedScene, view: CapturedView) -> np.ndarray:
-    """Trace rays from every receiver to every VPL of a view; returns [receivers, vpls] in {0, 1}."""
-    captured = view.captured
-    return ray_traced_visibility(
-        prepared.scene,
-        captured.position_world[captured.valid].astype(np.float64),
-        captured.normal_world[captured.valid],
-        captured.vpl_position_world.astype(np.float64),
-        captured.vpl_normal_world,
-    )
 
 
 def _figures(

@@ -137,7 +137,7 @@ def evaluate(
     """
     visibilities = []
     for index, view in enumerate(views):
-        visibilities.append(_visibility(scene, view))
+        visibilities.append(traced_visibility(scene, view))
         if progress is not None:
             progress(0.5 * (index + 1) / len(views))
     fitted = [i for i, view in enumerate(views) if view.view.split == "fitted"]
@@ -177,7 +177,8 @@ def _evaluate_view(
     return EvaluatedView(view, tuned, images, metrics, noise_floor(view.reference))
 
 
-def _visibility(scene: Scene, view: CapturedView) -> Bool[np.ndarray, "receivers vpls"]:
+def traced_visibility(scene: Scene, view: CapturedView) -> Bool[np.ndarray, "receivers vpls"]:
+    """Ray-traced visibility of a view's VPLs from all pixels with a surface."""
     captured = view.captured
     return ray_traced_visibility(
         scene,
@@ -185,6 +186,7 @@ def _visibility(scene: Scene, view: CapturedView) -> Bool[np.ndarray, "receivers
         captured.normal_world[captured.valid],
         captured.vpl_position_world.astype(np.float64),
         captured.vpl_normal_world,
+        captured.vpl_footprint.astype(np.float64) if captured.vpls_are_discs else None,
     )
 
 

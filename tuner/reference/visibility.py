@@ -23,11 +23,20 @@ def ray_traced_visibility(
     normals_world: Float[np.ndarray, "receivers 3"],
     vpl_positions_world: Float[np.ndarray, "vpls 3"],
     vpl_normals_world: Float[np.ndarray, "vpls 3"],
+    disc_radii_world: Float[np.ndarray, " vpls"] | None = None,
 ) -> Bool[np.ndarray, "receivers vpls"]:
-    """Whether each receiver sees each VPL.
+    """Whether each receiver sees each VPL: the middle of a disc, or of the part over the receiver's horizon.
 
     Both ends lie on surfaces, with unit normals on the lit side. If either end is behind the other's tangent
     plane, the pair exchanges no light: it is False and costs no ray.
+
+    Args:
+        scene: what is in the way.
+        positions_world: of the receivers.
+        normals_world: of the receivers.
+        vpl_positions_world: points, or centres of discs.
+        vpl_normals_world: of the VPLs.
+        disc_radii_world: radii of discs; None for points.
 
     Raises:
         InputError: the scene has no triangles, or an index in it is out of range.
@@ -37,7 +46,10 @@ def ray_traced_visibility(
     receivers = traced.triangles.to_unit(positions_world) + lift * normals_world
     vpls = traced.triangles.to_unit(vpl_positions_world) + lift * vpl_normals_world
     w = traced.wavefront
-    tables = [w.table(a.astype(np.float32)) for a in (receivers, normals_world, vpls, vpl_normals_world)]
+    radii = np.zeros(len(vpls)) if disc_radii_world is None else disc_radii_world / traced.triangles.diagonal
+    tables = [
+        w.table(a.astype(np.float32)) for a in (receivers, normals_world, vpls, vpl_normals_world, radii)
+    ]
     visible = np.zeros((len(receivers), len(vpls)), bool)
     rows = max(1, RAYS_PER_LAUNCH // max(1, len(vpls)))
     for first in range(0, len(receivers) if len(vpls) else 0, rows):
@@ -49,7 +61,7 @@ def ray_traced_visibility(
 
 def _unoccluded(traced: TracedScene, tables: list, pair, count: int) -> Bool[np.ndarray, " count"]:
     w = traced.wavefront
-    receivers, normals, vpls, vpl_normals = tables
+    receivers, normals, vpls, vpl_normals, radii = tables
     lane = w.lanes(count)
     # Padding lanes of the last packet look up 0, and an integer division by 0 would kill the process.
     first, row_length = w.take(pair, lane * 0), w.maximum(w.take(pair, lane * 0 + 1), 1)
@@ -57,6 +69,21 @@ def _unoccluded(traced: TracedScene, tables: list, pair, count: int) -> Bool[np.
     origin = w.take_vector(receivers, receiver)
     # `segment` is not normalised, so the ray ends at max_t = 1.
     segment = w.take_vector(vpls, vpl) - origin
-    facing = w.dot(w.take_vector(normals, receiver), segment) > 0.0
-    facing = facing & (w.dot(w.take_vector(vpl_normals, vpl), segment) < 0.0)
+    normal, vpl_normal = w.take_vector(normals, receiver), w.take_vector(vpl_normals, vpl)
+    segment = segment + _offset_in_sight(w, normal, vpl_normal, segment, w.take(radii, vpl))
+    facing = w.dot(normal, segment) > 0.0
+    facing = facing & (w.dot(vpl_normal, segment) < 0.0)
     return w.to_numpy(facing & ~w.occluded(origin, segment, 1.0, facing))
+
+
+def _offset_in_sight(w, normal, vpl_normal, segment, radius):
+    """From a disc's centre to the middle of the part in sight, where the receiver's horizon hides the centre.
+
+    The horizon cuts the disc's plane at `cut` from the centre. The middle is halfway from there to the rim.
+    """
+    between = w.dot(normal, vpl_normal)
+    # The bound avoids a division by 0 for parallel planes, which no horizon cuts.
+    slope = w.sqrt(w.maximum(1.0 - between * between, 1e-12))
+    cut = -w.dot(normal, segment) / slope
+    along = w.where((cut > 0.0) & (cut < radius), 0.5 * (cut + radius), 0.0)
+    return (normal - vpl_normal * between) * (along / slope)

@@ -60,6 +60,20 @@ def test_points_of_one_convex_room_see_each_other(shapes):
     ).any()
 
 
+@pytest.mark.parametrize(("x", "seen"), [(-0.7, True), (0.2, False)])
+def test_a_disc_is_seen_by_the_part_over_the_horizon(screen_between_floors, x, seen):
+    """A receiver that faces along +x, 1.5 above a disc of the floor, whose middle is 0.1 behind it.
+
+    The middle of the part in sight is 0.2 in front of it. The screen is in the way where x > 0.
+    """
+    receiver, center = np.array([[x, 1.5, 0.0]]), np.array([[x - 0.1, 0.0, 0.0]])
+    ends = receiver, np.array([[1.0, 0.0, 0.0]]), center, UP[None]
+    assert not ray_traced_visibility(screen_between_floors, *ends).any()
+    assert ray_traced_visibility(screen_between_floors, *ends, np.array([0.5])).all() == seen
+    # A disc that does not reach the horizon.
+    assert not ray_traced_visibility(screen_between_floors, *ends, np.array([0.09])).any()
+
+
 @pytest.mark.parametrize(("receivers", "vpls"), [(1, 1), (3, 5), (7, 9), (1, 17)])
 def test_pairs_that_fill_no_whole_packet(screen_between_floors, receivers, vpls):
     """A processor runs 4 to 16 lanes at once. Padding lanes after the last pair must not crash it."""

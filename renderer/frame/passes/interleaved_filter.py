@@ -7,8 +7,9 @@ from vpltune.renderer.gpu.gpu_program import ComputeProgram
 from vpltune.renderer.gpu.render_targets import EMPTY_DISPATCH, GBUFFER_READS, pixel_groups
 from vpltune.renderer.gpu.resources import Resources
 
-PLANE_TOLERANCE = 1.0
-"""Pixel footprints that a neighbour may stand off a pixel's plane and still be on its surface."""
+PLANE_TOLERANCE = 0.5
+"""Pixel footprints that a neighbour may stand off a pixel's plane and still be on its surface. With 1, a dark
+slot one pixel high over a lamp was as bright as the ceiling."""
 NORMAL_COSINE = 0.8
 """Least cosine between the normals of one surface: 37 degrees, wide enough for coarse round meshes."""
 LEAST_COSINE = 1e-3

@@ -87,7 +87,7 @@ def test_codes_of_the_visibility_are_those_that_shaders_were_written_for():
 @pytest.mark.parametrize(
     ("quality", "expected"),
     [
-        (Quality(), {"INTERLEAVE": 0, "MAP_SIZE": 24, "MAP_REFINEMENT": 4, "RSM_RESOLUTION": 0}),
+        (Quality(), {"INTERLEAVE": 0, "MAP_SIZE": 32, "MAP_REFINEMENT": 4, "RSM_RESOLUTION": 0}),
         (
             Quality(interleave=8, map_size=12, map_refinement=1, rsm_resolution=512),
             {"INTERLEAVE": 8, "MAP_SIZE": 12, "MAP_REFINEMENT": 1, "RSM_RESOLUTION": 512},

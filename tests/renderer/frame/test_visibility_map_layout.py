@@ -87,7 +87,7 @@ def test_room_for_finer_texels_fits_a_storage_buffer(vpl_count, size, refinement
 def test_the_layout_is_what_the_config_asks_for():
     config = TunedConfig(quality=Quality(map_size=12, map_refinement=2))
     assert VisibilityMapLayout.of(config) == VisibilityMapLayout(12, 2)
-    assert VisibilityMapLayout.of(TunedConfig()) == VisibilityMapLayout(24, 4)
+    assert VisibilityMapLayout.of(TunedConfig()) == VisibilityMapLayout(32, 4)
     assert VisibilityMapLayout.of(config.seen_by("transmittance")) == NO_MAPS
 
 

@@ -172,6 +172,15 @@ Texel texel_at(int vpl, ivec2 place, mat3 frame) {
     return Texel(frame * map_axis(place, map_size * map_refinement) * met.w, met.xyz, 1, 1u);
 }
 
+// Whether a pixel is on the other side of the sheet that was met: normals at more than 134°, and each end in the other's
+// plane up to 30°, since sheets bend.
+bool shows_its_back(Texel met, vec3 offset, vec3 normal) {
+    vec3 between = met.end - offset;
+    float height = min(dot(between, normal), dot(between, met.plane));
+    return dot(met.plane, normal) < -0.7
+        && height > -0.5 * length(between) - 1e-4 * (length(met.end) + length(offset));
+}
+
 // The overlap of a pixel whose tangent plane hides the middle of a disc: both the pixel and the place where that plane
 // cuts the disc are behind the surface. One that shows its back to the pixel hides it wholly.
 float rim_overlap(Texel met, vec3 offset, vec3 normal, vec3 axis) {
@@ -179,7 +188,7 @@ float rim_overlap(Texel met, vec3 offset, vec3 normal, vec3 axis) {
     vec3 cut = flat_normal * (dot(offset, normal) / max(dot(flat_normal, flat_normal), 1e-12));
     float height = min(dot(met.end - offset, met.plane), dot(met.end - cut, met.plane));
     bool back = dot(met.plane, normal) < 0.0 && height > -1e-4 * (length(met.end) + length(offset));
-    return back ? 1.0 : height / length(offset);
+    return back || shows_its_back(met, offset, normal) ? 1.0 : height / length(offset);
 }
 
 // The overlap of a pixel and a plane that a corner extends to the pixel's direction.
@@ -204,6 +213,7 @@ float visibility(int vpl, vec3 position, vec3 normal) {
     Texel own = texel_at(vpl, inside, frame);
     float hidden = dot(offset, normal) < 0.0
         ? overlap(own.end, own.plane, offset, normal) : rim_overlap(own, offset, normal, frame[2]);
+    hidden = shows_its_back(own, offset, normal) ? 1.0 : hidden;
     if (own.mark > 0u) {
         ivec2 start = inside / own.side * own.side;
         uint vertex = own.mark - 2u;

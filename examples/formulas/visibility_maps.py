@@ -12,6 +12,7 @@ NOTHING = 2.0
 FARTHEST = 1.5
 LEAST_OVERLAP = 2e-3
 ROUNDING = 1e-4
+SHEET_COSINE, SHEET_SLOPE = -0.7, 0.5
 CORNER_COSINE = 0.99
 VERTICES = ((-1, -1), (1, -1), (-1, 1), (1, 1))
 
@@ -58,13 +59,24 @@ def overlap(end, end_normal, receiver, receiver_normal) -> np.ndarray:
     return np.minimum(dot(between, receiver_normal), dot(between, end_normal)) / length(receiver)
 
 
+def shows_its_back(end, end_normal, receiver, receiver_normal) -> bool:
+    """Whether a receiver is on the other side of the sheet that was met."""
+    between = end - receiver
+    height = min(dot(between, receiver_normal), dot(between, end_normal))
+    rounding = ROUNDING * (length(end) + length(receiver))
+    return bool(
+        dot(end_normal, receiver_normal) < SHEET_COSINE and height > -SHEET_SLOPE * length(between) - rounding
+    )
+
+
 def rim_overlap(end, end_normal, receiver, receiver_normal) -> float:
     """`overlap` for a receiver whose tangent plane hides the middle of a disc."""
     flat = receiver_normal * [1.0, 1.0, 0.0]
     cut = flat * (dot(receiver, receiver_normal) / max(dot(flat, flat), 1e-12))
     height = min(dot(end - receiver, end_normal), dot(end - cut, end_normal))
     is_back = dot(end_normal, receiver_normal) < 0.0
-    if is_back and height > -ROUNDING * (length(end) + length(receiver)):
+    is_back = is_back and height > -ROUNDING * (length(end) + length(receiver))
+    if is_back or shows_its_back(end, end_normal, receiver, receiver_normal):
         return 1.0
     return float(height / length(receiver))
 
@@ -163,6 +175,7 @@ def vpl_visibility(position, normal, vpl: dict, maps: dict, scene_length: float,
     own = met_at(maps, column, row)
     facing = dot(receiver, receiver_normal) < 0.0
     hidden = (overlap if facing else rim_overlap)(*own, receiver, receiver_normal)
+    hidden = 1.0 if shows_its_back(*own, receiver, receiver_normal) else hidden
     is_block = maps["block"][coarse] >= 0
     mark = 1 if is_block else maps["corner"][coarse]
     if mark > 0:

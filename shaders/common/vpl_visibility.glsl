@@ -99,6 +99,20 @@ MapTexel map_texel(ivec2 place, int map_start) {
     return MapTexel(met_surface(entry, texel, VISIBILITY_MAP_SIZE), refinement, corner);
 }
 
+// Choices: normals at more than 134° are of two sides of a sheet, if each end is in the other's tangent plane up to 30°. A
+// sheet's facets bend, and a receiver's shading normal is between theirs. The two sides of a wedge are farther off.
+const float SHEET_COSINE = -0.7;
+const float SHEET_SLOPE = 0.5;
+
+// Whether a receiver is on the other side of the sheet that a ray hit, near the hit. Such a sheet hides it, however thin it
+// is: heights do not tell, for all of them are 0 up to rounding and to the sheet's bend.
+bool shows_its_back(MetSurface met, vec3 receiver, vec3 receiver_normal) {
+    vec3 between = met.end - receiver;
+    float height = min(dot(between, receiver_normal), dot(between, met.normal));
+    float rounding = VISIBILITY_ROUNDING * (length(receiver) + length(met.end));
+    return dot(met.normal, receiver_normal) < SHEET_COSINE && height > -SHEET_SLOPE * length(between) - rounding;
+}
+
 // The overlap of a surface and a receiver, as a share of the receiver's distance. It is the lesser of two heights: of
 // the surface in front of the receiver's tangent plane, and of the receiver behind the surface's own plane. The first
 // is receiver plane depth bias (Isidoro 2006). With the second, surfaces of one convex room or convex body never shade
@@ -117,8 +131,9 @@ float rim_overlap(MetSurface met, vec3 receiver, vec3 receiver_normal) {
     vec3 cut = vec3(receiver_normal.xy * (dot(receiver, receiver_normal) / squared), 0.0);
     float height = min(dot(met.end - receiver, met.normal), dot(met.end - cut, met.normal));
     float distance = length(receiver);
-    bool is_back = dot(met.normal, receiver_normal) < 0.0;
-    return is_back && height > -VISIBILITY_ROUNDING * (distance + length(met.end)) ? 1.0 : height / distance;
+    bool is_back = dot(met.normal, receiver_normal) < 0.0
+                && height > -VISIBILITY_ROUNDING * (distance + length(met.end));
+    return is_back || shows_its_back(met, receiver, receiver_normal) ? 1.0 : height / distance;
 }
 
 // Whether a hit lies behind the plane of another one, by more than rounding.
@@ -192,6 +207,7 @@ float vpl_visibility(
     MapTexel own = map_texel(ivec2(place), map_start);
     bool facing = dot(to_receiver, normal) < 0.0;
     float overlap = facing ? surface_overlap(own.met, to_receiver, normal) : rim_overlap(own.met, to_receiver, normal);
+    overlap = shows_its_back(own.met, to_receiver, normal) ? 1.0 : overlap;
     if (own.corner != 0u && overlap < parameters.bias + parameters.softness) {
         overlap = max(overlap, joined_overlap(own, place, map_start, to_receiver, normal));
     }

@@ -188,6 +188,10 @@ def surface_overlap(
     return jax.lax.map(chunk, inputs).reshape(-1, len(vpls.position))[:count]
 
 
+SHEET_COSINE, SHEET_SLOPE = -0.7, 0.5
+"""Bounds of `shows_its_back` in shaders/common/vpl_visibility.glsl."""
+
+
 class _Lookup:
     """The lookup in the maps of all VPLs. Places are in units of a map's finest texels."""
 
@@ -209,11 +213,18 @@ class _Lookup:
         flat = normal * jnp.array([1.0, 1.0, 0.0])
         cut = flat * (away / jnp.maximum(_dot(flat, flat), 1e-12))[..., None]
 
+        def shows_its_back(other: Array, other_normal: Array) -> Array:
+            between = other - receiver
+            height = jnp.minimum(_dot(between, normal), _dot(between, other_normal))
+            rounding = VISIBILITY_ROUNDING * (distance + jnp.linalg.norm(other, axis=-1))
+            bend = SHEET_SLOPE * jnp.linalg.norm(between, axis=-1)
+            return (_dot(other_normal, normal) < SHEET_COSINE) & (height > -bend - rounding)
+
         def rim(other: Array, other_normal: Array) -> Array:
             height = jnp.minimum(_dot(other - receiver, other_normal), _dot(other - cut, other_normal))
             rounding = VISIBILITY_ROUNDING * (distance + jnp.linalg.norm(other, axis=-1))
             is_back = (_dot(other_normal, normal) < 0.0) & (height > -rounding)
-            return jnp.where(is_back, distance, height)
+            return jnp.where(is_back | shows_its_back(other, other_normal), distance, height)
 
         def corner(other: Array, other_normal: Array) -> Array:
             between = other - receiver
@@ -222,7 +233,8 @@ class _Lookup:
             return jnp.where(away < 0.0, hidden, rim(other, other_normal))
 
         before, behind = _dot(end - receiver, normal), _dot(end - receiver, met_normal)
-        overlap = jnp.where(away < 0.0, jnp.minimum(before, behind), rim(end, met_normal))
+        facing = jnp.where(shows_its_back(end, met_normal), distance, jnp.minimum(before, behind))
+        overlap = jnp.where(away < 0.0, facing, rim(end, met_normal))
         ends, normals = [end], [met_normal]
         for around in self._around(place, own_place, coarse):
             on_map = ((around >= 0) & (around < self._finest)).all(-1)[..., None]

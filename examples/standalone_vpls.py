@@ -30,7 +30,8 @@ def virtual_point_lights(atlas, seen, bundle):
         samples = drawn(atlas, weight, bundle, rules["samples"])
         vpls = samples[:count]
         for _ in range(rules["steps"]):
-            vpls = relaxed(vpls, samples[samples[:, 3] > 0], length, rules["normal_reach"])
+            reaches = rules["normal_reach"], rules["sample_reach"]
+            vpls = relaxed(vpls, samples[samples[:, 3] > 0], length, *reaches)
     return vpls.astype("f4"), length
 
 
@@ -123,23 +124,23 @@ def drawn(atlas, weight, bundle, count):
     return np.hstack(vpls)
 
 
-def relaxed(vpls, samples, length, reach):
+def relaxed(vpls, samples, length, reach, sample_reach):
     """One Lloyd iteration (1982): each VPL moves to the centroid of its nearest samples, with their flux."""
+    unit = np.minimum(length, sample_reach * samples[:, 3])
 
-    def element(position, normal):  # normals count too: no cluster goes round an edge
-        return np.concatenate([position / length, reach * normal], axis=-1)
+    def far(some, unit, position, normal):  # normals count too: no cluster goes round an edge
+        squared = (some[:, :3] ** 2).sum(1)[:, None] - 2 * some[:, :3] @ position.T + (position**2).sum(1)
+        return squared / unit[:, None] ** 2 + 2 * reach**2 * (1 - some[:, 4:7] @ normal.T)
 
-    elements, owners = element(samples[:, :3], samples[:, 4:7]), element(vpls[:, :3], vpls[:, 4:7])
-    # Squared distances without the sample's own square, the same for all VPLs. Dark VPLs own no sample.
-    away = np.where(vpls[:, 3] > 0, (owners**2).sum(1), np.inf) - 2 * elements @ owners.T
+    away = np.where(vpls[:, 3] > 0, far(samples, unit, vpls[:, :3], vpls[:, 4:7]), np.inf)
     owner, moved = away.argmin(1), np.tile(DARK, (len(vpls), 1))
     for number in np.unique(owner):
         own = samples[owner == number]
         middle, facing = own[:, :3].mean(0), own[:, 4:7].sum(0)
         # The radius of a disc with the cluster's spread. A sample's own disc adds half its radius squared.
         radius = np.sqrt(2 * ((own[:, :3] - middle) ** 2).sum(1).mean() + (own[:, 3] ** 2).mean())
-        there = element(middle, facing / max(np.linalg.norm(facing), 1e-30))
-        near = own[((elements[owner == number] - there) ** 2).sum(1).argmin()]
+        facing = facing / max(np.linalg.norm(facing), 1e-30)
+        near = own[far(own, unit[owner == number], middle[None], facing[None]).argmin()]
         # Slide along the nearest sample's plane towards the centroid, but stay within that sample's disc: the
         # centroid of samples all round a box lies inside the box.
         slide = middle - near[:3]

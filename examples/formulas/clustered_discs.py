@@ -6,6 +6,7 @@ from examples.formulas.vectors import dot, length
 from examples.formulas.virtual_point_lights import DARK_NORMAL, Vpls
 
 NORMAL_REACH = 0.7
+SAMPLE_REACH = 64.0
 LEAST_SAMPLES = 4096
 SAMPLES_OF_VPL = 4
 LARGEST_COUNT = 4096
@@ -15,10 +16,11 @@ def sample_count(vpl_count: int) -> int:
     return max(LEAST_SAMPLES, SAMPLES_OF_VPL * vpl_count)
 
 
-def cluster_distance(between, normal, other_normal, scene_length: float) -> np.ndarray:
-    """How far apart two surface elements are [L²]."""
+def cluster_distance(between, normal, other_normal, footprint, scene_length: float) -> np.ndarray:
+    """How far apart a sample of this footprint and another surface element are."""
     turned = 2.0 * NORMAL_REACH**2 * (1.0 - dot(normal, other_normal))
-    return dot(between, between) / scene_length**2 + turned
+    unit = np.maximum(np.minimum(scene_length, SAMPLE_REACH * footprint), 1e-30)
+    return dot(between, between) / unit**2 + turned
 
 
 def lloyd_iteration(vpls: Vpls, samples: Vpls, scene_length: float) -> Vpls:
@@ -27,6 +29,7 @@ def lloyd_iteration(vpls: Vpls, samples: Vpls, scene_length: float) -> Vpls:
         samples.position[:, None] - vpls.position[None],
         samples.normal[:, None],
         vpls.normal[None],
+        samples.footprint[:, None],
         scene_length,
     )
     away = np.where(vpls.footprint > 0.0, away, np.inf)
@@ -43,7 +46,7 @@ def _cluster(samples: Vpls, own: np.ndarray, scene_length: float):
     middle = position.mean(axis=0)
     facing = normal.sum(axis=0)
     facing /= max(float(length(facing)), 1e-30)
-    nearest = int(cluster_distance(position - middle, normal, facing, scene_length).argmin())
+    nearest = int(cluster_distance(position - middle, normal, facing, footprint, scene_length).argmin())
     # To the middle over the plane of the sample nearest to it, but within that sample's disc.
     slide = middle - position[nearest]
     slide = slide - normal[nearest] * dot(normal[nearest], slide)

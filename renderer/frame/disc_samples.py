@@ -6,6 +6,9 @@ SAMPLES_OF_DISC = 4
 """Samples for each disc, at least. A choice."""
 NORMAL_REACH = 0.7
 """Distance, in L, that counts as much as normals that differ by 1. The best of 0.3, 0.7 and 1.5."""
+SAMPLE_REACH = 64.0
+"""Footprints of a sample that stand for L where L is longer. A choice of 32, 64 and 128: the least error, by
+1 %, in the courtyards of eight generated scenes; in rooms, L is shorter."""
 
 
 def sample_count(vpl_count: int) -> int:

@@ -40,8 +40,9 @@ int sample_nearest_to(int first_word, int lane, vec3 middle, vec3 normal) {
         for (uint members = vpl_members[first_word + word]; members != 0u; members &= members - 1u) {
             int index = 32 * word + findLSB(members);
             VirtualPointLight one = vpl_samples[index];
+            float one_length = cluster_length(scene_length, one);
             float away = cluster_distance(
-                one.position_footprint.xyz - middle, one.normal_area.xyz, normal, scene_length * scene_length);
+                one.position_footprint.xyz - middle, one.normal_area.xyz, normal, one_length * one_length);
             if (away < nearest) {
                 nearest = away;
                 found = index;

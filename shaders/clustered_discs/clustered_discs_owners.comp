@@ -23,7 +23,8 @@ void main() {
         return;
     }
     VirtualPointLight own = vpl_samples[index];
-    float length_squared = scene_length * scene_length;
+    float own_length = cluster_length(scene_length, own);
+    float length_squared = own_length * own_length;
     float nearest = 1e30;
     int owner = -1;
     for (int i = 0; i < vpl_count; ++i) {

@@ -1,17 +1,23 @@
 // Clustered disc lights: RSM samples grouped by their nearest VPL; each group becomes one VPL that shines as a disc.
 //
 // Provides: `cluster_distance`, `ClusterSums` and what is computed from them, and `clustered_disc`. Needs PI.
-// Constants: NORMAL_REACH [L] of renderer/frame/disc_samples.py.
+// Constants: NORMAL_REACH and SAMPLE_REACH of renderer/frame/disc_samples.py.
 // Python: renderer/frame/passes/clustered_discs.py. A numpy version: `relaxed` in examples/standalone_vpls.py.
 // Source: Lloyd 1982 for the iterations; Dong et al. 2009 ("Interactive indirect illumination using clustered
 // visibility") make virtual area lights from RSMs this way.
 #include "common/virtual_point_lights.glsl"
 
-// Squared distance between two surface elements in units of L². Their normals count too: opposite normals add
+// Squared distance between two surface elements in units of the squared `cluster_length`. Their normals count too: opposite normals add
 // (2 · NORMAL_REACH)². This keeps a cluster on one side of an edge, where all its light leaves in similar directions.
 float cluster_distance(vec3 between, vec3 normal, vec3 other_normal, float length_squared) {
     return dot(between, between) / length_squared
          + 2.0 * NORMAL_REACH * NORMAL_REACH * (1.0 - dot(normal, other_normal));
+}
+
+// The length that a sample's distances are measured in: L, but at most SAMPLE_REACH of its own footprints. L may be that
+// of kilometres of ground, and a window's reveal may face the same way as the sunlit wall beside it.
+float cluster_length(float scene_length, VirtualPointLight one) {
+    return min(scene_length, SAMPLE_REACH * one.position_footprint.w);
 }
 
 // Sums over the samples of one cluster. Offsets are relative to the VPL's previous position: they are short, so float32

@@ -13,14 +13,14 @@ layout(location = 0) out int out_owner;
 
 void main() {
     VirtualPointLight own = sample_at(ivec2(gl_FragCoord.xy));
-    float scene_length = measured_scene_length();
+    float own_length = cluster_length(measured_scene_length(), own);
     float nearest = 1e30;
     int owner = -1;
     for (int i = 0; i < vpl_count; ++i) {
         VirtualPointLight vpl = vpl_at(i);
         vec3 between = own.position_footprint.xyz - vpl.position_footprint.xyz;
         float away = cluster_distance(
-            between, own.normal_area.xyz, vpl.normal_area.xyz, scene_length * scene_length);
+            between, own.normal_area.xyz, vpl.normal_area.xyz, own_length * own_length);
         if (away < nearest && vpl.normal_area.w > 0.0) {
             nearest = away;
             owner = i;

@@ -119,6 +119,7 @@ def _defines(document: dict[str, Any]) -> dict[str, Define]:
         "RAY_STACK_SIZE": _TREE_DEPTH,
         "EXPOSURE_KEY": EXPOSURE_KEY,
         "NORMAL_REACH": document["clustered_discs"]["normal_reach"],
+        "SAMPLE_REACH": document["clustered_discs"]["sample_reach"],
         **vpl_disc_bounds.DEFINES,
         **vpl_importance.DEFINES,
         "IMPORTANCE_CELLS": document["vpl_importance"]["cells"],

@@ -25,9 +25,6 @@ choice."""
 FRAME_TURNS_OVER = -0.5
 """The z of a normal below which a map's tangents turn over. Not 0, where walls have their normals and
 rounding would decide."""
-_LARGEST_SHARE = 0.4
-"""Share of the texels that may be refined. 3 to 12 % of a room's texels are at a silhouette, 28 % in the
-busiest of sixteen scenes. Beyond that, texels stay coarse, and which ones may differ from frame to frame."""
 _MOST_DETAIL_BYTES = 1 << 27
 """Bytes that every driver takes in one storage buffer: with blocks of 4², about 10,000 default maps of a
 room."""
@@ -65,11 +62,14 @@ class VisibilityMapLayout:
         }
 
     def blocks(self, vpl_count: int) -> int:
-        """Blocks of finer texels that there is room for."""
+        """Blocks of finer texels that there is room for: one for every texel of 1,024 default maps.
+
+        Where they run out, texels stay coarse, and which ones may differ from frame to frame.
+        """
         if self.refinement == 1:
             return 0
         most = _MOST_DETAIL_BYTES // (self.refinement**2 * TEXEL_BYTES)
-        return min(int(_LARGEST_SHARE * vpl_count * self.size**2), most)
+        return min(vpl_count * self.size**2, most)
 
 
 NO_MAPS = VisibilityMapLayout(0, 1)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from config_documents import OLDER_QUALITY
 
 import vpltune.tuner.batch.batch
 import vpltune.tuner.scene_fit.evaluate_scene
@@ -74,7 +75,7 @@ BROUGHT_FORWARD = TunedConfig(
     ),
     {"scene": "box"},
     "transmittance",
-    quality=Quality(interleave=1),
+    quality=OLDER_QUALITY,
     fit=FitNote("kept", "no gain"),
 )
 

@@ -27,7 +27,7 @@ def poses() -> list[np.ndarray]:
     return carried
 
 
-def carried(gl_context, visibility: str, size: int = 24) -> np.ndarray:
+def carried(gl_context, visibility: str, size: int = Quality().map_size) -> np.ndarray:
     """Indirect irradiance, [frames, height, width, 3]; the light is a lamp that shines beside the board."""
     runtime = Runtime(colored_room(), context=gl_context)
     config = TunedConfig(PARAMETERS, visibility=visibility, quality=Quality(map_size=size))

@@ -71,7 +71,8 @@ def test_the_most_vpls_have_maps(gl_context):
 def test_silhouettes_that_find_no_room_stay_coarse(gl_context, monkeypatch):
     """With room for a 400th of the texels, of which more are silhouettes: between no finer texels and all."""
     unrefined, refined = (room_light(gl_context, 12, refinement) for refinement in (1, 4))
-    monkeypatch.setattr(visibility_map_layout, "_LARGEST_SHARE", 1.0 / 400.0)
+    all_bytes = 64 * 12**2 * 4**2 * TEXEL_BYTES
+    monkeypatch.setattr(visibility_map_layout, "_MOST_DETAIL_BYTES", all_bytes // 400)
     crowded = room_light(gl_context, 12, 4)
     assert 0.0 < relative_rms(crowded, refined) < 1.1 * relative_rms(unrefined, refined)
 

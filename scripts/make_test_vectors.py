@@ -11,17 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from vector_json import json_text, plain
 
 from examples.formulas import boxes as box_scene
 from examples.formulas import display, visibility_maps
 from examples.formulas.clustered_discs import lloyd_iteration
 from examples.formulas.point_table import r2_points, rotated
-from examples.formulas.punctual_lights import (
-    cone_falloff,
-    facing_irradiance,
-    light_faces,
-    towards_light,
-)
+from examples.formulas.punctual_lights import cone_falloff, facing_irradiance, light_faces, towards_light
 from examples.formulas.reflective_shadow_map import (
     RsmTexels,
     rsm_texels,
@@ -36,7 +32,6 @@ from examples.formulas.vpl_gather import gather
 from examples.formulas.vpl_importance import importance_cells, importance_factor
 
 FILE = Path(__file__).resolve().parents[1] / "docs" / "test_vectors.json"
-DIGITS = 9
 """Significant digits of the file's numbers. A choice: more than a float32 holds."""
 
 BOXES = [
@@ -395,37 +390,6 @@ def _display() -> dict[str, Any]:
     )
     encoded = display.srgb_encode(display.tone_curve(colors))
     return {"exposed_radiance": colors, "srgb": encoded, "bytes": np.floor(255.0 * encoded + 0.5).astype(int)}
-
-
-def plain(value: Any) -> Any:
-    """As JSON has it, numbers rounded to `DIGITS` digits."""
-    if isinstance(value, dict):
-        return {key: plain(each) for key, each in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [plain(each) for each in value]
-    if isinstance(value, bool | str) or value is None:
-        return value
-    if isinstance(value, int | np.integer):
-        return int(value)
-    # Zero has no sign, and what float64 left of it is zero.
-    return float(f"{value:.{DIGITS}g}") if abs(value) > 1e-14 else 0.0
-
-
-def json_text(value: Any, indent: int = 0) -> str:
-    """JSON with one row of numbers a line."""
-    import json
-
-    flat = json.dumps(value, ensure_ascii=False)
-    if not isinstance(value, dict | list) or len(flat) + indent <= 110:
-        return flat
-    inner = " " * (indent + 1)
-    if isinstance(value, dict):
-        items = [f"{inner}{json.dumps(key)}: {json_text(each, indent + 1)}" for key, each in value.items()]
-        return "{\n" + ",\n".join(items) + "\n" + " " * indent + "}"
-    items = [inner + json_text(each, indent + 1) for each in value]
-    return "[\n" + ",\n".join(items) + "\n" + " " * indent + "]"
 
 
 if __name__ == "__main__":

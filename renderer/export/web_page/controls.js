@@ -1,4 +1,4 @@
-// --- the page's controls: buttons, sliders, keys and pointer. Follows page.js in one script. ----------------------
+// --- the page's controls: buttons, sliders, keys and pointer. Follows frame.js in one script. ---------------------
 const element = (id) => document.getElementById(id);
 // The parameters that have a slider.
 const LIVE = ["intensity", "falloff_footprint", "extinction_coefficient", "density_exponent"];

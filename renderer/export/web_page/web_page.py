@@ -94,7 +94,7 @@ def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
         "DOCUMENT": _json(document),
         "BINARY": base64.b64encode(zlib.compress(binary, 9)).decode("ascii"),
         "SHADERS": _json(_shaders(drawn, defines)),
-        "SCRIPT": _text("page.js") + _text("controls.js"),
+        "SCRIPT": _text("page.js") + _text("frame.js") + _text("controls.js"),
     }
     page = _text("page.html")
     # Piece by piece from the template's own places: what is put in is never looked into.

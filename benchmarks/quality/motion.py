@@ -50,7 +50,7 @@ VPL_COUNT = 256
 RSM_RESOLUTION = 1024
 """Texels along the side of an RSM face: the runtime's own for one or two faces."""
 REFERENCE_VPLS = 4096
-"""VPLs of the reference. A choice: 16 times `VPL_COUNT`, and as many as have maps."""
+"""VPLs of the reference. A choice: 16 times `VPL_COUNT`."""
 REFERENCE_RSM_FACTOR = 2
 """Resolution of the reference's RSM over that of the compared images. A choice."""
 REFERENCE_FRAMES = 24
@@ -93,13 +93,13 @@ def variants() -> dict[str, Variant]:
 
 
 CAMERA_VARIANTS = ("old_default", "default")
-"""Variants for the clip of the camera: nothing that a camera does moves the RSM of a room's spot."""
+"""Variants for the clip of the camera, which moves no RSM: options of the RSM change nothing."""
 SPOT_VARIANTS = (*CAMERA_VARIANTS, "neither", "filtering")
 """Variants for the clip with the spot, whose RSM face follows its cone and not the bounds: none snaps it."""
 SUN_VARIANTS = ("neither", "snapping", "filtering", "both")
 """Variants for the clip of the sun, whose RSM face follows the bounds."""
 CAMERA_REACH = 0.05
-"""Way of the carried camera, in diagonals of the scene. A choice: it stays in the room."""
+"""Length of the carried camera's path, in diagonals of the scene. A choice: it stays in the room."""
 CAMERA_TURN = 0.2
 """Largest angle, in radians, that the carried camera turns by. A choice."""
 
@@ -181,7 +181,7 @@ def swept_spot() -> Clip:
 
 
 def carried_camera() -> Clip:
-    """The gallery's camera moves as its spot does in `swept_spot`, and turns on the way."""
+    """The gallery's camera moves sideways by `CAMERA_REACH`, and turns from side to side by `CAMERA_TURN`."""
     scene, view = _shipped("gallery")
     low, high = scene.bounds()
     reach = CAMERA_REACH * float(np.linalg.norm(high - low))

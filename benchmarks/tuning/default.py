@@ -150,6 +150,14 @@ def ratio_rows(scenes: list[Measured]) -> list[Row]:
                     max(WORST, limit),
                 )
             )
+        if of_group:
+            new, old = (
+                [scene.figures[config]["off_share"] for scene in of_group] for config in ("default", "old")
+            )
+            found += [
+                Row(f"{group}.beads", median(new), "of the pixels", "median, the old default", median(old)),
+                Row(f"{group}.worst_beads", max(new), "of the pixels", "worst, the old default", max(old)),
+            ]
     return found
 
 

@@ -172,27 +172,25 @@ Texel texel_at(int vpl, ivec2 place, mat3 frame) {
     return Texel(frame * map_axis(place, map_size * map_refinement) * met.w, met.xyz, 1, 1u);
 }
 
-// Whether a pixel is on the other side of the sheet that was met: normals at more than 134°, and each end in the other's
-// plane up to 30°, since sheets bend.
+// Whether a pixel is on the other side of the sheet that was met, near the hit.
 bool shows_its_back(Texel met, vec3 offset, vec3 normal) {
     vec3 between = met.end - offset;
-    float height = min(dot(between, normal), dot(between, met.plane));
+    float apart = length(between), rounding = 1e-4 * (length(met.end) + length(offset));
     return dot(met.plane, normal) < -0.7
-        && height > -0.5 * length(between) - 1e-4 * (length(met.end) + length(offset));
+        && dot(between, met.plane) > -0.3 * apart - rounding && dot(between, normal) > -0.5 * apart - rounding;
 }
 
 // The overlap of a pixel whose tangent plane hides the middle of a disc: both the pixel and the place where that plane
-// cuts the disc are behind the surface. One that shows its back to the pixel hides it wholly.
+// cuts the disc are behind the surface.
 float rim_overlap(Texel met, vec3 offset, vec3 normal, vec3 axis) {
     vec3 flat_normal = normal - axis * dot(normal, axis);
     vec3 cut = flat_normal * (dot(offset, normal) / max(dot(flat_normal, flat_normal), 1e-12));
-    float height = min(dot(met.end - offset, met.plane), dot(met.end - cut, met.plane));
-    bool back = dot(met.plane, normal) < 0.0 && height > -1e-4 * (length(met.end) + length(offset));
-    return back || shows_its_back(met, offset, normal) ? 1.0 : height / length(offset);
+    return min(dot(met.end - offset, met.plane), dot(met.end - cut, met.plane)) / length(offset);
 }
 
 // The overlap of a pixel and a plane that a corner extends to the pixel's direction.
 float corner_overlap(Texel met, vec3 offset, vec3 normal, vec3 axis) {
+    if (shows_its_back(met, offset, normal)) { return 1.0; }
     if (dot(offset, normal) >= 0.0) { return rim_overlap(met, offset, normal, axis); }
     bool before = dot(met.end - offset, normal) > -1e-4 * length(offset);
     return before ? dot(met.end - offset, met.plane) / length(offset) : -1.0;

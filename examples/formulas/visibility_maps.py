@@ -12,7 +12,7 @@ NOTHING = 2.0
 FARTHEST = 1.5
 LEAST_OVERLAP = 2e-3
 ROUNDING = 1e-4
-SHEET_COSINE, SHEET_SLOPE = -0.7, 0.5
+SHEET_COSINE, SHEET_BEND, SHEET_TILT = -0.7, 0.3, 0.5
 CORNER_COSINE = 0.99
 VERTICES = ((-1, -1), (1, -1), (-1, 1), (1, 1))
 
@@ -62,10 +62,11 @@ def overlap(end, end_normal, receiver, receiver_normal) -> np.ndarray:
 def shows_its_back(end, end_normal, receiver, receiver_normal) -> bool:
     """Whether a receiver is on the other side of the sheet that was met."""
     between = end - receiver
-    height = min(dot(between, receiver_normal), dot(between, end_normal))
-    rounding = ROUNDING * (length(end) + length(receiver))
+    apart, rounding = length(between), ROUNDING * (length(end) + length(receiver))
     return bool(
-        dot(end_normal, receiver_normal) < SHEET_COSINE and height > -SHEET_SLOPE * length(between) - rounding
+        dot(end_normal, receiver_normal) < SHEET_COSINE
+        and dot(between, end_normal) > -SHEET_BEND * apart - rounding
+        and dot(between, receiver_normal) > -SHEET_TILT * apart - rounding
     )
 
 
@@ -73,16 +74,13 @@ def rim_overlap(end, end_normal, receiver, receiver_normal) -> float:
     """`overlap` for a receiver whose tangent plane hides the middle of a disc."""
     flat = receiver_normal * [1.0, 1.0, 0.0]
     cut = flat * (dot(receiver, receiver_normal) / max(dot(flat, flat), 1e-12))
-    height = min(dot(end - receiver, end_normal), dot(end - cut, end_normal))
-    is_back = dot(end_normal, receiver_normal) < 0.0
-    is_back = is_back and height > -ROUNDING * (length(end) + length(receiver))
-    if is_back or shows_its_back(end, end_normal, receiver, receiver_normal):
-        return 1.0
-    return float(height / length(receiver))
+    return float(min(dot(end - receiver, end_normal), dot(end - cut, end_normal)) / length(receiver))
 
 
 def corner_overlap(end, end_normal, receiver, receiver_normal) -> float:
     """`overlap` with a plane that a corner extends to the receiver's direction."""
+    if shows_its_back(end, end_normal, receiver, receiver_normal):
+        return 1.0
     if not dot(receiver, receiver_normal) < 0.0:
         return rim_overlap(end, end_normal, receiver, receiver_normal)
     if not dot(end - receiver, receiver_normal) > -ROUNDING * length(receiver):

@@ -4,9 +4,9 @@ import moderngl
 
 
 class ClipState:
-    """The discs and the eased parameters of an `auto` config. Make one for each clip, and none for a still.
+    """Clustered discs and the eased parameters of an `auto` config. Make one for a clip, and none for a still.
 
-    All of it is on the GPU. Discs start where the frame before left them, so they flicker less.
+    All of it is on the GPU. Lloyd iterations start from the discs of the frame before, which flickers less.
 
     It stays with the OpenGL context that it was first drawn on.
 

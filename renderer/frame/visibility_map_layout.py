@@ -22,6 +22,16 @@ texel's corner number mark - 2, the same for every receiver."""
 VISIBILITY_ROUNDING = 1e-4
 """Rounding of positions and of 16-bit normals moves a point by less than this share of the distance. A
 choice."""
+SHEET_COSINE = -0.7
+"""A choice, as the next two. A receiver is taken to be on the other side of the sheet that a ray hit if the
+normals are at more than 134° (`shows_its_back` in shaders/common/vpl_visibility.glsl)."""
+SHEET_BEND = 0.3
+"""The receiver is within 17° of the hit's plane: facets of a lampshade of 24 sides are at 15°."""
+SHEET_TILT = 0.5
+"""The hit is within 30° of the plane of the receiver's shading normal, which is between those of facets."""
+FEW_LOOKED_UP = 8
+"""Where receivers may look up at most so many texels of a map, all that the camera sees is a few texels wide
+to the VPL, and may lie between two rays. Each of these texels is cast finer. A choice: 128 rays at most."""
 FRAME_TURNS_OVER = -0.5
 """The z of a normal below which a map's tangents turn over. Not 0, where walls have their normals and
 rounding would decide."""
@@ -58,6 +68,10 @@ class VisibilityMapLayout:
             "VISIBILITY_NEAREST_VERTEX": f"{VISIBILITY_NEAREST_VERTEX}u",
             "VISIBILITY_FIRST_VERTEX": f"{VISIBILITY_FIRST_VERTEX}u",
             "VISIBILITY_ROUNDING": VISIBILITY_ROUNDING,
+            "VISIBILITY_SHEET_COSINE": SHEET_COSINE,
+            "VISIBILITY_SHEET_BEND": SHEET_BEND,
+            "VISIBILITY_SHEET_TILT": SHEET_TILT,
+            "FEW_LOOKED_UP": FEW_LOOKED_UP,
             "FRAME_TURNS_OVER": FRAME_TURNS_OVER,
         }
 

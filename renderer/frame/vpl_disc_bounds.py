@@ -1,10 +1,12 @@
 """Bounds of a disc of light, for `shaders/common/vpl_disc.glsl` and its twin `tuner.surrogate.vpl_disc`."""
 
+from vpltune.renderer.frame.visibility_map_layout import VISIBILITY_LIFT
+
 LEAST_PART = 1e-4
 """Share of a disc's area over a receiver's horizon below which it gives nothing: it has two digits left."""
 LEAST_RADIUS = 1e-6
 """In L: dark VPLs have no footprint."""
-FADE_HEIGHT = 0.02
+FADE_HEIGHT = 2.0 * VISIBILITY_LIFT
 """In radii: where a disc's light begins to fade towards its own plane. At half of that it is gone: there, the
 VPL's visibility map begins (`VISIBILITY_LIFT`). So near, an RSM's depth does not tell which side of a surface
 a receiver is on, and the underside of a box on the floor would get all of the floor's radiosity."""

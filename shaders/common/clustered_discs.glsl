@@ -7,8 +7,9 @@
 // visibility") make virtual area lights from RSMs this way.
 #include "common/virtual_point_lights.glsl"
 
-// Squared distance between two surface elements in units of the squared `cluster_length`. Their normals count too: opposite normals add
-// (2 · NORMAL_REACH)². This keeps a cluster on one side of an edge, where all its light leaves in similar directions.
+// Squared distance between two surface elements in units of the squared `cluster_length`. Their normals count too:
+// opposite normals add (2 · NORMAL_REACH)². This keeps a cluster on one side of an edge, where all its light leaves in
+// similar directions.
 float cluster_distance(vec3 between, vec3 normal, vec3 other_normal, float length_squared) {
     return dot(between, between) / length_squared
          + 2.0 * NORMAL_REACH * NORMAL_REACH * (1.0 - dot(normal, other_normal));

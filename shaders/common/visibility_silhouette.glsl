@@ -1,6 +1,6 @@
 // Silhouettes in a visibility map. One runs through a texel if the surface that its ray hit shades the surface that a
-// neighbour's ray hit, or the other way round, and where one of the two rays hits nothing: a receiver in the texel may be
-// inside of what the other one hits. There, one ray says too little. The corner of a room, or the edge of a
+// neighbour's ray hit, or the other way round. Another runs where one of the two rays hits nothing: a receiver in the
+// texel may be inside of what the other ray hits. There, one ray says too little. The corner of a room, or the edge of a
 // box that faces the VPL, hides nothing and is no silhouette. A concave corner, such as a room's or a wall's foot, hides
 // what is behind it: no texel is finer for it, but it is marked.
 //

@@ -56,7 +56,8 @@ VirtualPointLight texel_vpl(ivec2 texel, vec2 within) {
     const int reach = RSM_FILTERING / 2;
     ivec2 tile_low = texel / RSM_RESOLUTION * RSM_RESOLUTION;
     ivec2 low = max(texel - reach, tile_low);
-    ivec2 high = min(texel + reach, tile_low + RSM_RESOLUTION - 1);
+    ivec2 tile_high = tile_low + RSM_RESOLUTION - 1;
+    ivec2 high = min(texel + reach, tile_high);
     float weight = 0.0;
     float area = 0.0;
     vec3 flux = vec3(0.0);
@@ -78,7 +79,6 @@ VirtualPointLight texel_vpl(ivec2 texel, vec2 within) {
     // The rest of the table's point after the inversion gives the position inside the texel. As the light moves or the
     // density changes, the VPL slides over the surface and does not jump between texel centres. It does not slide over
     // the surface's edge: beyond a wall's foot it would light what is behind the wall.
-    ivec2 tile_high = tile_low + RSM_RESOLUTION - 1;
     ivec2 towards = ivec2(within.x < 0.5 ? -1 : 1, within.y < 0.5 ? -1 : 1);
     within.x = goes_on(surface, texel + ivec2(towards.x, 0), tile_low, tile_high) ? within.x : 0.5;
     within.y = goes_on(surface, texel + ivec2(0, towards.y), tile_low, tile_high) ? within.y : 0.5;

@@ -99,18 +99,15 @@ MapTexel map_texel(ivec2 place, int map_start) {
     return MapTexel(met_surface(entry, texel, VISIBILITY_MAP_SIZE), refinement, corner);
 }
 
-// Choices: normals at more than 134° are of two sides of a sheet, if each end is in the other's tangent plane up to 30°. A
-// sheet's facets bend, and a receiver's shading normal is between theirs. The two sides of a wedge are farther off.
-const float SHEET_COSINE = -0.7;
-const float SHEET_SLOPE = 0.5;
-
 // Whether a receiver is on the other side of the sheet that a ray hit, near the hit. Such a sheet hides it, however thin it
-// is: heights do not tell, for all of them are 0 up to rounding and to the sheet's bend.
+// is: the overlaps below are 0 then, up to rounding and to the sheet's bend.
 bool shows_its_back(MetSurface met, vec3 receiver, vec3 receiver_normal) {
     vec3 between = met.end - receiver;
-    float height = min(dot(between, receiver_normal), dot(between, met.normal));
+    float apart = length(between);
     float rounding = VISIBILITY_ROUNDING * (length(receiver) + length(met.end));
-    return dot(met.normal, receiver_normal) < SHEET_COSINE && height > -SHEET_SLOPE * length(between) - rounding;
+    return dot(met.normal, receiver_normal) < VISIBILITY_SHEET_COSINE
+        && dot(between, met.normal) > -VISIBILITY_SHEET_BEND * apart - rounding
+        && dot(between, receiver_normal) > -VISIBILITY_SHEET_TILT * apart - rounding;
 }
 
 // The overlap of a surface and a receiver, as a share of the receiver's distance. It is the lesser of two heights: of
@@ -124,16 +121,12 @@ float surface_overlap(MetSurface met, vec3 receiver, vec3 receiver_normal) {
 }
 
 // The same for a receiver whose tangent plane hides the middle of a disc. The disc's part in sight begins where that
-// plane cuts the disc's, and it is beyond the surface if that place is behind the surface too. A surface that shows its
-// back to the receiver hides it wholly, however thin: it may be the other side of the receiver's own wall.
+// plane cuts the disc's, and it is beyond the surface if that place is behind the surface too.
 float rim_overlap(MetSurface met, vec3 receiver, vec3 receiver_normal) {
     float squared = max(dot(receiver_normal.xy, receiver_normal.xy), 1e-12);
     vec3 cut = vec3(receiver_normal.xy * (dot(receiver, receiver_normal) / squared), 0.0);
-    float height = min(dot(met.end - receiver, met.normal), dot(met.end - cut, met.normal));
-    float distance = length(receiver);
-    bool is_back = dot(met.normal, receiver_normal) < 0.0
-                && height > -VISIBILITY_ROUNDING * (distance + length(met.end));
-    return is_back || shows_its_back(met, receiver, receiver_normal) ? 1.0 : height / distance;
+    return min(dot(met.end - receiver, met.normal), dot(met.end - cut, met.normal))
+        * inversesqrt(dot(receiver, receiver));
 }
 
 // Whether a hit lies behind the plane of another one, by more than rounding.
@@ -145,6 +138,9 @@ bool is_behind(MetSurface met, MetSurface other) {
 // height of the receiver behind the surface's plane, unless the hit is behind the receiver's tangent plane. In that
 // plane it may be the corner itself.
 float corner_overlap(MetSurface met, vec3 receiver, vec3 receiver_normal) {
+    if (shows_its_back(met, receiver, receiver_normal)) {
+        return 1.0;
+    }
     if (!(dot(receiver, receiver_normal) < 0.0)) {
         return rim_overlap(met, receiver, receiver_normal);
     }

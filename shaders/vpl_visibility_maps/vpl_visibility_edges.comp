@@ -3,6 +3,7 @@
 //
 // Reads: `visibility_marks`. Reads and writes: `visibility_maps`. Writes: the list of texels.
 // Constants: VISIBILITY_BLOCKS, the number of blocks that there is room for. Further silhouettes stay coarse.
+// FEW_LOOKED_UP of renderer/frame/visibility_map_layout.py.
 // Python: renderer/frame/passes/vpl_visibility_maps.py.
 #include "common/scene_length.glsl"
 #include "common/virtual_point_lights.glsl"
@@ -15,10 +16,6 @@ shared uvec2 whole_map[TEXELS];  // a copy as cast: other invocations overwrite 
 #include "common/visibility_edges.glsl"
 #include "common/visibility_marks.glsl"
 #include "common/visibility_workgroup.glsl"
-
-// A choice: where a map has so few texels that receivers may look up, all that the camera sees is a few texels wide to the
-// VPL, and may lie between two rays. Each of these texels is cast finer.
-const int FEW_LOOKED_UP = 8;
 
 layout(local_size_x = 64) in;
 

@@ -36,7 +36,7 @@ def ray_traced_visibility(
         normals_world: of the receivers.
         vpl_positions_world: points, or centres of discs.
         vpl_normals_world: of the VPLs.
-        disc_radii_world: radii of discs; None for points.
+        disc_radii_world: radii of discs in world units; None for points.
 
     Raises:
         InputError: the scene has no triangles, or an index in it is out of range.
@@ -77,7 +77,7 @@ def _unoccluded(traced: TracedScene, tables: list, pair, count: int) -> Bool[np.
 
 
 def _offset_in_sight(w, normal, vpl_normal, segment, radius):
-    """From a disc's centre to the middle of the part in sight, where the receiver's horizon hides the centre.
+    """Vector from a disc's centre to the middle of its part in sight [scene diagonals]; 0 to a centre in sight.
 
     The horizon cuts the disc's plane at `cut` from the centre. The middle is halfway from there to the rim.
     """

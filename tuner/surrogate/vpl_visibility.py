@@ -12,6 +12,9 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.frame.capture import CapturedFrame, VisibilityMaps
 from vpltune.renderer.frame.visibility_map_layout import (
     FRAME_TURNS_OVER,
+    SHEET_BEND,
+    SHEET_COSINE,
+    SHEET_TILT,
     VISIBILITY_FIRST_VERTEX,
     VISIBILITY_LIFT,
     VISIBILITY_ROUNDING,
@@ -188,10 +191,6 @@ def surface_overlap(
     return jax.lax.map(chunk, inputs).reshape(-1, len(vpls.position))[:count]
 
 
-SHEET_COSINE, SHEET_SLOPE = -0.7, 0.5
-"""Bounds of `shows_its_back` in shaders/common/vpl_visibility.glsl."""
-
-
 class _Lookup:
     """The lookup in the maps of all VPLs. Places are in units of a map's finest texels."""
 
@@ -215,26 +214,27 @@ class _Lookup:
 
         def shows_its_back(other: Array, other_normal: Array) -> Array:
             between = other - receiver
-            height = jnp.minimum(_dot(between, normal), _dot(between, other_normal))
+            apart = jnp.linalg.norm(between, axis=-1)
             rounding = VISIBILITY_ROUNDING * (distance + jnp.linalg.norm(other, axis=-1))
-            bend = SHEET_SLOPE * jnp.linalg.norm(between, axis=-1)
-            return (_dot(other_normal, normal) < SHEET_COSINE) & (height > -bend - rounding)
+            return (
+                (_dot(other_normal, normal) < SHEET_COSINE)
+                & (_dot(between, other_normal) > -SHEET_BEND * apart - rounding)
+                & (_dot(between, normal) > -SHEET_TILT * apart - rounding)
+            )
 
         def rim(other: Array, other_normal: Array) -> Array:
-            height = jnp.minimum(_dot(other - receiver, other_normal), _dot(other - cut, other_normal))
-            rounding = VISIBILITY_ROUNDING * (distance + jnp.linalg.norm(other, axis=-1))
-            is_back = (_dot(other_normal, normal) < 0.0) & (height > -rounding)
-            return jnp.where(is_back | shows_its_back(other, other_normal), distance, height)
+            return jnp.minimum(_dot(other - receiver, other_normal), _dot(other - cut, other_normal))
 
         def corner(other: Array, other_normal: Array) -> Array:
             between = other - receiver
             reaches = _dot(between, normal) > -VISIBILITY_ROUNDING * distance
             hidden = jnp.where(reaches, _dot(between, other_normal), -distance)
-            return jnp.where(away < 0.0, hidden, rim(other, other_normal))
+            overlap = jnp.where(away < 0.0, hidden, rim(other, other_normal))
+            return jnp.where(shows_its_back(other, other_normal), distance, overlap)
 
         before, behind = _dot(end - receiver, normal), _dot(end - receiver, met_normal)
-        facing = jnp.where(shows_its_back(end, met_normal), distance, jnp.minimum(before, behind))
-        overlap = jnp.where(away < 0.0, facing, rim(end, met_normal))
+        overlap = jnp.where(away < 0.0, jnp.minimum(before, behind), rim(end, met_normal))
+        overlap = jnp.where(shows_its_back(end, met_normal), distance, overlap)
         ends, normals = [end], [met_normal]
         for around in self._around(place, own_place, coarse):
             on_map = ((around >= 0) & (around < self._finest)).all(-1)[..., None]

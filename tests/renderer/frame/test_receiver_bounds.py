@@ -11,6 +11,7 @@ from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.passes import receiver_bounds
 from vpltune.renderer.frame.runtime import DrawnFrame, Runtime
+from vpltune.renderer.frame.visibility_map_layout import FEW_LOOKED_UP
 from vpltune.renderer.scene.scene import Camera, Light, Scene, look_at
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.prior.scene_generator import generated_scene
@@ -19,8 +20,6 @@ QUALITY = Quality(interleave=1, rsm_resolution=128)
 POINTS = TunedConfig(ArtistParameters(vpl_count=48, lloyd_iterations=0), quality=QUALITY)
 DISCS = replace(POINTS, parameters=replace(POINTS.parameters, lloyd_iterations=1))
 INTERLEAVED = replace(DISCS, quality=replace(QUALITY, interleave=4))
-FEW_LOOKED_UP = 8
-"""Of shaders/vpl_visibility_maps/vpl_visibility_edges.comp."""
 SIZE = (50, 38)
 """No multiple of a tile."""
 

@@ -4,7 +4,7 @@ import moderngl
 
 
 class ClipState:
-    """Clustered discs and the eased parameters of an `auto` config. Make one for a clip, and none for a still.
+    """Clustered discs and the eased parameters of an `auto` config. Make one for each clip, none for stills.
 
     All of it is on the GPU. Lloyd iterations start from the discs of the frame before, which flickers less.
 

@@ -77,7 +77,7 @@ def _unoccluded(traced: TracedScene, tables: list, pair, count: int) -> Bool[np.
 
 
 def _offset_in_sight(w, normal, vpl_normal, segment, radius):
-    """Vector from a disc's centre to the middle of its part in sight [scene diagonals]; 0 to a centre in sight.
+    """From a disc's centre to the middle of its part in sight [scene diagonals]; 0 if the centre is in sight.
 
     The horizon cuts the disc's plane at `cut` from the centre. The middle is halfway from there to the rim.
     """

@@ -4,6 +4,7 @@ Slurm only runs the tasks; progress is read from the records on disk. A preempte
 continues. Scenes of a task that died go into another array.
 """
 
+import os
 import sys
 import threading
 import time
@@ -13,6 +14,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+# submitit's set-up of logging closes the handlers of everybody else, absl's with its stream, and prints to
+# standard output.
+os.environ.setdefault("SUBMITIT_LOG_LEVEL", "NOCONFIG")
 import submitit
 
 from vpltune.renderer.errors import InputError, MachineError

@@ -1,6 +1,6 @@
 // Irradiance from a clustered disc light, for standalone_reader.py: a disc of even radiosity, cut off at the receiver's
 // horizon. The program defines least_part (a share of the disc's area), least_radius in units of scene_length,
-// and fade_height in radii. The derivation is in shaders/common/vpl_disc.glsl.
+// fade_height and facing_fade_height in radii. The derivation is in shaders/common/vpl_disc.glsl.
 
 #ifdef LIGHTING
 // A chord cuts a unit disc at distance t from the centre, t > 0 if the centre is on the kept side. Returns the kept
@@ -24,7 +24,9 @@ float disc_form(vec3 d, vec3 n, vec3 m, float radius) {
     radius = max(radius, least_radius);
     float height = -dot(m, d), between = dot(n, m), slope = sqrt(max(1.0 - between * between, 1e-12));
     // So close to the disc's plane, the depth in the light's map does not tell on which side of it the receiver is.
-    float fade = clamp(2.0 * height / (fade_height * radius) - 1.0, 0.0, 1.0);
+    // A receiver that faces the disc fades higher up: the surface that the disc stands for may not be flat.
+    float facing = max(-between, 0.0), fade_from = (fade_height + facing_fade_height * facing * facing) * radius;
+    float fade = clamp(2.0 * height / fade_from - 1.0, 0.0, 1.0);
     vec2 part = past_chord(dot(n, d) / (slope * radius));
     if (fade == 0.0 || part.x < least_part) { return 0.0; }
     // The part above the receiver's horizon is taken as a disc of its own area around its own centroid (Howell, Siegel

@@ -30,7 +30,7 @@ def virtual_point_lights(atlas, seen, bundle):
         samples = drawn(atlas, weight, bundle, rules["samples"])
         vpls = samples[:count]
         for _ in range(rules["steps"]):
-            reaches = rules["normal_reach"], rules["sample_reach"]
+            reaches = rules["normal_reach"], rules["off_plane_factor"], rules["sample_reach"]
             vpls = relaxed(vpls, samples[samples[:, 3] > 0], length, *reaches)
     return vpls.astype("f4"), length
 
@@ -124,7 +124,7 @@ def drawn(atlas, weight, bundle, count):
     return np.hstack(vpls)
 
 
-def relaxed(vpls, samples, length, reach, sample_reach):
+def relaxed(vpls, samples, length, reach, off_plane_factor, sample_reach):
     """One Lloyd iteration (1982): each VPL moves to the centroid of its nearest samples, with their flux."""
     unit = np.minimum(length, sample_reach * samples[:, 3])
 
@@ -132,7 +132,12 @@ def relaxed(vpls, samples, length, reach, sample_reach):
         squared = (some[:, :3] ** 2).sum(1)[:, None] - 2 * some[:, :3] @ position.T + (position**2).sum(1)
         return squared / unit[:, None] ** 2 + 2 * reach**2 * (1 - some[:, 4:7] @ normal.T)
 
-    away = np.where(vpls[:, 3] > 0, far(samples, unit, vpls[:, :3], vpls[:, 4:7]), np.inf)
+    # A disc is flat: offsets from its plane, and from the sample's, count more than those along them.
+    above = samples[:, :3] @ vpls[:, 4:7].T - (vpls[:, :3] * vpls[:, 4:7]).sum(1)
+    below = (samples[:, :3] * samples[:, 4:7]).sum(1)[:, None] - samples[:, 4:7] @ vpls[:, :3].T
+    off_plane = off_plane_factor * np.maximum(abs(above), abs(below)) / unit[:, None]
+    away = far(samples, unit, vpls[:, :3], vpls[:, 4:7]) + off_plane**2
+    away = np.where(vpls[:, 3] > 0, away, np.inf)
     owner, moved = away.argmin(1), np.tile(DARK, (len(vpls), 1))
     for number in np.unique(owner):
         own = samples[owner == number]

@@ -6,6 +6,7 @@ from examples.formulas.vectors import dot, length
 from examples.formulas.virtual_point_lights import DARK_NORMAL, Vpls
 
 NORMAL_REACH = 0.7
+OFF_PLANE_FACTOR = 8.0
 SAMPLE_REACH = 64.0
 LEAST_SAMPLES = 4096
 SAMPLES_OF_VPL = 4
@@ -17,10 +18,20 @@ def sample_count(vpl_count: int) -> int:
 
 
 def cluster_distance(between, normal, other_normal, footprint, scene_length: float) -> np.ndarray:
-    """How far apart a sample of this footprint and another surface element are."""
+    """How far a sample of this footprint is from a VPL."""
+    off_plane = OFF_PLANE_FACTOR * np.maximum(abs(dot(between, normal)), abs(dot(between, other_normal)))
+    unit = cluster_length(footprint, scene_length)
+    return middle_distance(between, normal, other_normal, footprint, scene_length) + (off_plane / unit) ** 2
+
+
+def middle_distance(between, normal, other_normal, footprint, scene_length: float) -> np.ndarray:
+    """How far a sample of this footprint is from the middle of its cluster."""
     turned = 2.0 * NORMAL_REACH**2 * (1.0 - dot(normal, other_normal))
-    unit = np.maximum(np.minimum(scene_length, SAMPLE_REACH * footprint), 1e-30)
-    return dot(between, between) / unit**2 + turned
+    return dot(between, between) / cluster_length(footprint, scene_length) ** 2 + turned
+
+
+def cluster_length(footprint, scene_length: float) -> np.ndarray:
+    return np.maximum(np.minimum(scene_length, SAMPLE_REACH * footprint), 1e-30)
 
 
 def lloyd_iteration(vpls: Vpls, samples: Vpls, scene_length: float) -> Vpls:
@@ -46,7 +57,7 @@ def _cluster(samples: Vpls, own: np.ndarray, scene_length: float):
     middle = position.mean(axis=0)
     facing = normal.sum(axis=0)
     facing /= max(float(length(facing)), 1e-30)
-    nearest = int(cluster_distance(position - middle, normal, facing, footprint, scene_length).argmin())
+    nearest = int(middle_distance(position - middle, normal, facing, footprint, scene_length).argmin())
     # To the middle over the plane of the sample nearest to it, but within that sample's disc.
     slide = middle - position[nearest]
     slide = slide - normal[nearest] * dot(normal[nearest], slide)

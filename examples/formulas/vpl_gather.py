@@ -8,6 +8,7 @@ from examples.formulas.virtual_point_lights import Vpls
 LEAST_PART = 1e-4
 LEAST_RADIUS = 1e-6
 FADE_HEIGHT = 0.02
+FACING_FADE_HEIGHT = 0.4
 
 
 def point_form(position, normal, vpls: Vpls, alpha: float) -> np.ndarray:
@@ -29,7 +30,8 @@ def disc_form(position, normal, vpls: Vpls, alpha: float, scene_length: float) -
     slope = np.sqrt(np.maximum(1.0 - between**2, 1e-12))
     above = dot(normal, to_vpl) / (slope * radius)
     share, offset = disc_past_chord(above)
-    fade = np.minimum(2.0 * height / (FADE_HEIGHT * radius) - 1.0, 1.0)
+    fade_height = (FADE_HEIGHT + FACING_FADE_HEIGHT * np.maximum(-between, 0.0) ** 2) * radius
+    fade = np.minimum(2.0 * height / fade_height - 1.0, 1.0)
     lit = (fade > 0.0) & (share >= LEAST_PART)
     height, share = np.maximum(height, 0.0), np.maximum(share, LEAST_PART)
 

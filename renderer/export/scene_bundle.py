@@ -15,7 +15,7 @@ import numpy as np
 from vpltune.renderer.config.tuned_config import TunedConfig, config_text
 from vpltune.renderer.files.atomic_file import written_whole
 from vpltune.renderer.frame import vpl_disc_bounds
-from vpltune.renderer.frame.disc_samples import NORMAL_REACH, SAMPLE_REACH, sample_count
+from vpltune.renderer.frame.disc_samples import NORMAL_REACH, OFF_PLANE_FACTOR, SAMPLE_REACH, sample_count
 from vpltune.renderer.frame.passes import vpl_importance
 from vpltune.renderer.frame.passes.tone_mapping import EXPOSURE_KEY
 from vpltune.renderer.frame.point_table import R2_STEPS
@@ -116,11 +116,13 @@ def _clustered_discs(config: TunedConfig) -> dict[str, Any]:
         "steps": config.parameters.lloyd_iterations if config.parameters.vpls_are_discs else 0,
         "samples": sample_count(config.parameters.vpl_count),
         "normal_reach": NORMAL_REACH,
+        "off_plane_factor": OFF_PLANE_FACTOR,
         "sample_reach": SAMPLE_REACH,
         "disc": {
             "least_part": vpl_disc_bounds.LEAST_PART,
             "least_radius": vpl_disc_bounds.LEAST_RADIUS,
             "fade_height": vpl_disc_bounds.FADE_HEIGHT,
+            "facing_fade_height": vpl_disc_bounds.FACING_FADE_HEIGHT,
         },
     }
 

@@ -41,7 +41,7 @@ int sample_nearest_to(int first_word, int lane, vec3 middle, vec3 normal) {
             int index = 32 * word + findLSB(members);
             VirtualPointLight one = vpl_samples[index];
             float one_length = cluster_length(scene_length, one);
-            float away = cluster_distance(
+            float away = middle_distance(
                 one.position_footprint.xyz - middle, one.normal_area.xyz, normal, one_length * one_length);
             if (away < nearest) {
                 nearest = away;

@@ -1,18 +1,27 @@
 // Clustered disc lights: RSM samples grouped by their nearest VPL; each group becomes one VPL that shines as a disc.
 //
-// Provides: `cluster_distance`, `ClusterSums` and what is computed from them, and `clustered_disc`. Needs PI.
-// Constants: NORMAL_REACH and SAMPLE_REACH of renderer/frame/disc_samples.py.
+// Provides: `cluster_distance`, `middle_distance`, `ClusterSums` and what is computed from them, and
+// `clustered_disc`. Needs PI.
+// Constants: NORMAL_REACH, OFF_PLANE_FACTOR and SAMPLE_REACH of renderer/frame/disc_samples.py.
 // Python: renderer/frame/passes/clustered_discs.py. A numpy version: `relaxed` in examples/standalone_vpls.py.
 // Source: Lloyd 1982 for the iterations; Dong et al. 2009 ("Interactive indirect illumination using clustered
 // visibility") make virtual area lights from RSMs this way.
 #include "common/virtual_point_lights.glsl"
 
-// Squared distance between two surface elements in units of the squared `cluster_length`. Their normals count too:
+// Squared distance of a sample from a cluster's middle, in units of the squared `cluster_length`. Normals count too:
 // opposite normals add (2 · NORMAL_REACH)². This keeps a cluster on one side of an edge, where all its light leaves in
 // similar directions.
-float cluster_distance(vec3 between, vec3 normal, vec3 other_normal, float length_squared) {
+float middle_distance(vec3 between, vec3 normal, vec3 other_normal, float length_squared) {
     return dot(between, between) / length_squared
          + 2.0 * NORMAL_REACH * NORMAL_REACH * (1.0 - dot(normal, other_normal));
+}
+
+// Squared distance of a sample from a VPL, in the same units. Offsets from either one's plane count more than those along
+// it: a disc is flat, and where its samples are not, as in the folds of a curtain, it sticks out of the surface on both
+// sides. Not so to a cluster's middle: around a corner, which sample is nearest to it would change with rounding.
+float cluster_distance(vec3 between, vec3 normal, vec3 other_normal, float length_squared) {
+    float off_plane = OFF_PLANE_FACTOR * max(abs(dot(between, normal)), abs(dot(between, other_normal)));
+    return middle_distance(between, normal, other_normal, length_squared) + off_plane * off_plane / length_squared;
 }
 
 // The length that a sample's distances are measured in: L, but at most SAMPLE_REACH of its own footprints. L may be that
@@ -52,7 +61,7 @@ vec3 cluster_offset(ClusterSums sums) {
 
 // The cluster's mean direction.
 vec3 cluster_normal(ClusterSums sums) {
-    // Where normals cancel, the result is near 0 and only positions count in `cluster_distance`.
+    // Where normals cancel, the result is near 0 and only positions count in `middle_distance`.
     return sums.normal_square.xyz / max(length(sums.normal_square.xyz), 1e-30);
 }
 

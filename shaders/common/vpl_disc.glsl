@@ -1,7 +1,8 @@
 // Irradiance from a clustered disc light: a disc of even radiosity, cut off at the receiver's horizon.
 //
 // Provides: `disc_vector_irradiance`. Needs PI, common/virtual_point_lights.glsl and common/vpl_irradiance.glsl.
-// Constants: DISC_LEAST_PART, DISC_LEAST_RADIUS and DISC_FADE_HEIGHT of renderer/frame/vpl_disc_bounds.py.
+// Constants: DISC_LEAST_PART, DISC_LEAST_RADIUS, DISC_FADE_HEIGHT and DISC_FACING_FADE_HEIGHT of
+// renderer/frame/vpl_disc_bounds.py.
 // Twin: tuner/surrogate/vpl_disc.py. A short version: examples/standalone_disc.glsl.
 //
 // The disc has centre c, normal m, radius l and flux Φ. A receiver at x, with normal n, is h = m·(x - c) > 0 above its
@@ -51,7 +52,9 @@ vec3 disc_vector(vec3 to_vpl, vec3 normal, vec3 vpl_normal, float radius) {
     float slope = sqrt(max(1.0 - between * between, 1e-12));
     float above = dot(normal, to_vpl) / (slope * radius);
     vec2 part = disc_past_chord(above);
-    float fade = min(2.0 * height / (DISC_FADE_HEIGHT * radius) - 1.0, 1.0);
+    float facing = max(-between, 0.0);
+    float fade_height = (DISC_FADE_HEIGHT + DISC_FACING_FADE_HEIGHT * facing * facing) * radius;
+    float fade = min(2.0 * height / fade_height - 1.0, 1.0);
     if (!(fade > 0.0) || part.x < DISC_LEAST_PART) {
         return vec3(0.0);
     }

@@ -28,7 +28,7 @@ ivec2 sample_nearest_to(int vpl_index, vec3 middle, vec3 normal) {
             if (texelFetch(vpl_owners, texel, 0).r == vpl_index) {
                 VirtualPointLight one = sample_at(texel);
                 float one_length = cluster_length(scene_length, one);
-                float away = cluster_distance(
+                float away = middle_distance(
                     one.position_footprint.xyz - middle, one.normal_area.xyz, normal, one_length * one_length);
                 if (away < nearest) {
                     nearest = away;

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from vpltune.renderer.frame.vpl_disc_bounds import FADE_HEIGHT, LEAST_PART
+from vpltune.renderer.frame.vpl_disc_bounds import FACING_FADE_HEIGHT, FADE_HEIGHT, LEAST_PART
 
 
 def disc_past_chord(t: Float[Array, "*n"]) -> tuple[Float[Array, "*n"], Float[Array, "*n"]]:
@@ -67,7 +67,8 @@ def disc_form(
     slope = jnp.sqrt(jnp.maximum(1.0 - between**2, 1e-12))
     above = facing / (slope * radius)
     share, offset = disc_past_chord(above)
-    fade = jnp.minimum(2.0 * height / (FADE_HEIGHT * radius) - 1.0, 1.0)
+    fade_height = (FADE_HEIGHT + FACING_FADE_HEIGHT * jnp.maximum(-between, 0.0) ** 2) * radius
+    fade = jnp.minimum(2.0 * height / fade_height - 1.0, 1.0)
     lit = (fade > 0.0) & (share >= LEAST_PART)
     height = jnp.maximum(height, 0.0)
     share = jnp.maximum(share, LEAST_PART)

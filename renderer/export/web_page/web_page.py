@@ -119,6 +119,7 @@ def _defines(document: dict[str, Any]) -> dict[str, Define]:
         "RAY_STACK_SIZE": _TREE_DEPTH,
         "EXPOSURE_KEY": EXPOSURE_KEY,
         "NORMAL_REACH": document["clustered_discs"]["normal_reach"],
+        "OFF_PLANE_FACTOR": document["clustered_discs"]["off_plane_factor"],
         "SAMPLE_REACH": document["clustered_discs"]["sample_reach"],
         **vpl_disc_bounds.DEFINES,
         **vpl_importance.DEFINES,

@@ -1,6 +1,6 @@
 """Clustered disc lights: VPLs that each take the light of the RSM samples nearest to them."""
 
-from vpltune.renderer.frame.disc_samples import NORMAL_REACH, SAMPLE_REACH, sample_count
+from vpltune.renderer.frame.disc_samples import DEFINES, sample_count
 from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
 from vpltune.renderer.gpu.gpu_program import ComputeProgram
 from vpltune.renderer.gpu.resources import Resources
@@ -50,7 +50,8 @@ class ClusteredDiscsPass(FramePass):
 
     def _compiled(self) -> tuple[ComputeProgram, ComputeProgram, ComputeProgram]:
         """Compiled when they are first needed: points need none."""
-        resources, defines = self._resources, {"NORMAL_REACH": NORMAL_REACH, "SAMPLE_REACH": SAMPLE_REACH}
+        resources = self._resources
+        defines = DEFINES
         words = self._vpl_count * -(-sample_count(self._vpl_count) // 32)
         resources["vpl_members"] = resources.context.buffer(bytes(4 * words))
         self._programs = (

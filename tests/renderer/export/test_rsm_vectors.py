@@ -19,7 +19,7 @@ from vector_file import (
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.parameter_block import parameter_bytes
 from vpltune.renderer.frame.capture import octahedral_decode
-from vpltune.renderer.frame.disc_samples import NORMAL_REACH, SAMPLE_REACH
+from vpltune.renderer.frame.disc_samples import DEFINES
 from vpltune.renderer.frame.passes.reflective_shadow_map import ReflectiveShadowMapPass
 from vpltune.renderer.frame.passes.virtual_point_lights import VirtualPointLightsPass, VplDensityPass
 from vpltune.renderer.frame.passes.vpl_importance import DEFINES as IMPORTANCE_DEFINES
@@ -218,14 +218,14 @@ def test_lloyd_iterations(gl_context):
     owners = ComputeProgram(
         resources,
         "clustered_discs/clustered_discs_owners",
-        {"NORMAL_REACH": NORMAL_REACH, "SAMPLE_REACH": SAMPLE_REACH},
+        DEFINES,
         reads=("frame_statistics", "vpl_samples", "virtual_point_lights"),
         writes=("vpl_members",),
     )
     discs = ComputeProgram(
         resources,
         "clustered_discs/clustered_discs",
-        {"NORMAL_REACH": NORMAL_REACH, "SAMPLE_REACH": SAMPLE_REACH},
+        DEFINES,
         reads=("frame_statistics", "vpl_samples"),
         writes=("virtual_point_lights", "vpl_members"),
     )

@@ -127,7 +127,7 @@ def test_a_shipped_scene_by_the_command_line(tmp_path, capfd, name, visibility):
 
 
 @pytest.mark.parametrize("light", ["point", "directional"])
-@pytest.mark.parametrize("placement", [{"lloyd_iterations": 8}, {"density_importance": 0.7}], ids=str)
+@pytest.mark.parametrize("placement", [{"lloyd_iterations": 2}, {"density_importance": 0.7}], ids=str)
 def test_few_vpls_are_placed_as_the_runtime_places_them(tmp_path, light, placement):
     """As cells, which shine as discs, or by what the camera sees."""
     plain = with_parameters(CONFIG, vpl_count=32, falloff_footprint=DISC_FOOTPRINT).seen_by("maps")

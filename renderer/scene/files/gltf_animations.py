@@ -88,17 +88,6 @@ def read_channels(document: GltfDocument, nodes: GltfNodes, accessors: GltfAcces
     return list(taken.values())
 
 
-def moving_nodes(channels: Sequence[Channel], nodes: GltfNodes) -> set[int]:
-    """The nodes with a channel and all their descendants."""
-    moving = {channel.node for channel in channels}
-    pending = list(moving)
-    while pending:
-        below = [child for child in nodes.children[pending.pop()] if child not in moving]
-        moving.update(below)
-        pending.extend(below)
-    return moving
-
-
 def placed_animation(channels: Sequence[Channel], placed: Placed, nodes: GltfNodes) -> Animation | None:
     """The animation of the placed instances, lights and cameras; None if none of them moves."""
     leaves = [*placed.instance_nodes, *placed.light_nodes, *placed.camera_nodes]

@@ -91,6 +91,8 @@ def read_uri(document: GltfDocument, holder: JsonObject) -> bytes:
     """
     uri = holder.string("uri")
     where = holder.at("uri")
+    if not uri.isascii() and any("\ud800" <= c <= "\udfff" for c in uri):
+        raise SceneFileError(f"{where}: must be Unicode text, got the lone surrogate in {uri!r:.80}")
     if uri[:5].lower() == "data:":
         return _data_uri(uri, where)
     if _SCHEME.match(uri):

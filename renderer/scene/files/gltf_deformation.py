@@ -10,7 +10,21 @@ from vpltune.renderer.scene.files.gltf_accessors import Elements, GltfAccessors
 from vpltune.renderer.scene.files.gltf_document import GltfDocument
 from vpltune.renderer.scene.files.gltf_nodes import GltfNodes
 from vpltune.renderer.scene.files.json_object import JsonObject
+from vpltune.renderer.scene.files.limits import VERTEX_CHUNK, DecodedBytes
 from vpltune.renderer.scene.files.surface import unit_rows
+
+
+@dataclass(frozen=True, eq=False)
+class RestSkin:
+    """A skin of the document at rest."""
+
+    joints: list[int]
+    """The nodes of its joints."""
+    inverse_bind: Float64[np.ndarray, "joints 4 4"]
+    joint_to_world: Float64[np.ndarray, "joints 4 4"]
+    """World matrix times inverse bind matrix of each joint."""
+    is_animated: bool
+    """Whether the joints move, so that the mesh must keep its bind pose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,65 +33,67 @@ class Deformation:
 
     weights: tuple[float, ...] = ()
     """Weights of the morph targets."""
-    joint_to_world: Float64[np.ndarray, "joints 4 4"] | None = None
-    """World matrix times inverse bind matrix of each joint; None without a skin."""
-    is_animated: bool = False
-    """Whether the joints move, so that the mesh must keep its bind pose."""
+    skin: RestSkin | None = None
 
 
-def read_deformation(
-    node: JsonObject,
-    mesh: JsonObject,
-    document: GltfDocument,
-    nodes: GltfNodes,
-    accessors: GltfAccessors,
-    moving_nodes: set[int],
-) -> Deformation:
-    """The morph weights of a node (its own, or else its mesh's) and the rest pose of its skin.
+class GltfDeformations:
+    """The skins and morph weights of one document. Nodes that deform a mesh alike share a deformation.
 
     Args:
-        node: the node that shows the mesh.
-        mesh: the mesh.
-        document: the document of both.
+        document: the document.
         nodes: gives the joints' transforms to world.
         accessors: reads the inverse bind matrices.
         moving_nodes: indices of the animated nodes.
-
-    Raises:
-        SceneFileError: a reference is out of range, or counts do not match.
     """
-    holder = node if "weights" in node.members else mesh
-    count = len(holder.members["weights"]) if isinstance(holder.members.get("weights"), list) else 0
-    weights = tuple(holder.numbers("weights", count, default=()).tolist())
-    skin = document.referred(node, "skin", "skins")
-    if skin is None:
-        return Deformation(weights)
-    joints, inverse_bind = read_skin(skin, nodes, accessors)
-    to_world = np.stack([nodes.to_world(joint) for joint in joints]) @ inverse_bind
-    return Deformation(weights, to_world, any(joint in moving_nodes for joint in joints))
 
+    def __init__(
+        self, document: GltfDocument, nodes: GltfNodes, accessors: GltfAccessors, moving_nodes: set[int]
+    ) -> None:
+        self._document = document
+        self._nodes = nodes
+        self._accessors = accessors
+        self._moving_nodes = moving_nodes
+        self._skins: dict[str, RestSkin] = {}
+        self._deformations: dict[tuple[str, str], Deformation] = {}
 
-def read_skin(
-    skin: JsonObject, nodes: GltfNodes, accessors: GltfAccessors
-) -> tuple[list[int], Float64[np.ndarray, "joints 4 4"]]:
-    """The nodes of a skin's joints, and their inverse bind matrices.
+    def of(self, node: JsonObject, mesh: JsonObject) -> Deformation:
+        """The morph weights of a node (its own, or else its mesh's) and its skin.
 
-    Raises:
-        SceneFileError: there are no joints, one is out of range, or there are fewer matrices than joints.
-    """
-    joints = skin.indices("joints", len(nodes.nodes), "nodes")
-    if not joints:
-        raise SceneFileError(f"{skin.where}: must have at least one joint")
-    if "inverseBindMatrices" not in skin.members:
-        return joints, np.tile(np.eye(4), (len(joints), 1, 1))
-    inverse_bind = accessors.referred(skin, "inverseBindMatrices", ("MAT4",))
-    if len(inverse_bind) < len(joints):
-        raise SceneFileError(
-            f"{inverse_bind.where}: must have a matrix for each of {len(joints)} joints, "
-            f"got {len(inverse_bind)}"
-        )
-    stored = inverse_bind.as_floats(np.arange(len(joints))).astype(np.float64)
-    return joints, stored.reshape(-1, 4, 4).transpose(0, 2, 1)
+        Raises:
+            SceneFileError: a reference is out of range, or counts do not match.
+        """
+        holder = node if "weights" in node.members else mesh
+        skin = self._document.referred(node, "skin", "skins")
+        key = (holder.where, "" if skin is None else skin.where)
+        if key not in self._deformations:
+            listed = holder.members.get("weights")
+            count = len(listed) if isinstance(listed, list) else 0
+            weights = tuple(holder.numbers("weights", count, default=()).tolist())
+            self._deformations[key] = Deformation(weights, None if skin is None else self._skin(skin))
+        return self._deformations[key]
+
+    def _skin(self, skin: JsonObject) -> RestSkin:
+        if skin.where not in self._skins:
+            joints = skin.indices("joints", len(self._nodes.nodes), "nodes")
+            if not joints:
+                raise SceneFileError(f"{skin.where}: must have at least one joint")
+            inverse_bind = self._inverse_bind(skin, len(joints))
+            to_world = np.stack([self._nodes.to_world(joint) for joint in joints]) @ inverse_bind
+            is_animated = any(joint in self._moving_nodes for joint in joints)
+            self._skins[skin.where] = RestSkin(joints, inverse_bind, to_world, is_animated)
+        return self._skins[skin.where]
+
+    def _inverse_bind(self, skin: JsonObject, joint_count: int) -> Float64[np.ndarray, "joints 4 4"]:
+        if "inverseBindMatrices" not in skin.members:
+            return np.tile(np.eye(4), (joint_count, 1, 1))
+        inverse_bind = self._accessors.referred(skin, "inverseBindMatrices", ("MAT4",))
+        if len(inverse_bind) < joint_count:
+            raise SceneFileError(
+                f"{inverse_bind.where}: must have a matrix for each of {joint_count} joints, "
+                f"got {len(inverse_bind)}"
+            )
+        stored = inverse_bind.as_floats(np.arange(joint_count)).astype(np.float64)
+        return stored.reshape(-1, 4, 4).transpose(0, 2, 1)
 
 
 def morphed(
@@ -88,6 +104,7 @@ def morphed(
     accessors: GltfAccessors,
     used: Int64[np.ndarray, " n"],
     vertex_count: int,
+    budget: DecodedBytes,
 ) -> Float32[np.ndarray, "n 3"]:
     """`base` plus the weighted displacements of the primitive's morph targets.
 
@@ -99,9 +116,11 @@ def morphed(
         accessors: reads the displacements.
         used: indices of the used vertices.
         vertex_count: number of vertices, used or not, that each target must have.
+        budget: the limit of all displacements.
 
     Raises:
-        SceneFileError: there are more weights than targets, or a target has another vertex count.
+        SceneFileError: there are more weights than targets, or a target has another vertex count or a value
+            that is not finite.
     """
     targets = primitive.objects("targets")
     if len(weights) > len(targets) and any(weights[len(targets) :]):
@@ -110,20 +129,27 @@ def morphed(
             f"got {len(targets)}"
         )
     total = base.astype(np.float64)
-    for target, weight in zip(targets, weights, strict=False):
-        if weight == 0.0 or semantic not in target.members:
+    for index, target in enumerate(targets):
+        if semantic not in target.members:
             continue
         displacement = accessors.referred(target, semantic, ("VEC3",))
         if len(displacement) != vertex_count:
             raise SceneFileError(
                 f"{displacement.where}: must have {vertex_count} elements, got {len(displacement)}"
             )
-        total += weight * displacement.as_floats(used)
+        # A target of weight 0 is read too: its numbers must be finite like all others.
+        budget.spend(12 * len(used), displacement.where)
+        offsets = displacement.as_floats(used)
+        if index < len(weights) and weights[index] != 0.0:
+            total += weights[index] * offsets
     return total.astype(np.float32)
 
 
 def read_influences(
-    attributes: dict[str, Elements], used: Int64[np.ndarray, " n"], joint_count: int
+    attributes: dict[str, Elements],
+    used: Int64[np.ndarray, " n"],
+    joint_count: int,
+    decoded: DecodedBytes,
 ) -> tuple[Int32[np.ndarray, "n influences"], Float64[np.ndarray, "n influences"]]:
     """The joints of each vertex, and their weights, which sum to 1.
 
@@ -131,30 +157,41 @@ def read_influences(
         attributes: the primitive's, with JOINTS_0 and perhaps further sets.
         used: indices of the used vertices.
         joint_count: number of joints of the skin.
+        decoded: the memory limit.
 
     Raises:
-        SceneFileError: a joint is out of range, a weight is negative, or a vertex has no weight above zero.
+        SceneFileError: a joint is out of range, a weight is negative, a vertex has no weight above zero, or
+            memory runs out.
     """
-    joints: list[np.ndarray] = []
-    weights: list[np.ndarray] = []
-    for i in [i for i in range(len(attributes)) if f"JOINTS_{i}" in attributes]:
+    sets = [i for i in range(len(attributes)) if f"JOINTS_{i}" in attributes]
+    for i in sets:
         if f"WEIGHTS_{i}" not in attributes:
             raise SceneFileError(f"{attributes[f'JOINTS_{i}'].where}: JOINTS_{i} must come with WEIGHTS_{i}")
-        joints.append(attributes[f"JOINTS_{i}"].stored[used].astype(np.int64))
-        weights.append(attributes[f"WEIGHTS_{i}"].as_floats(used).astype(np.float64))
-        used_joints = joints[-1][weights[-1] > 0.0]
-        if (joints[-1] < 0).any() or (used_joints >= joint_count).any() or (weights[-1] < 0.0).any():
-            raise SceneFileError(
-                f"{attributes[f'JOINTS_{i}'].where}: joints must be below {joint_count}, "
-                "and weights must not be negative"
-            )
-    all_weights = np.concatenate(weights, axis=1)
-    total = all_weights.sum(axis=1, keepdims=True)
+    shape = (len(used), 4 * len(sets))
+    decoded.spend(12 * shape[0] * shape[1], attributes["JOINTS_0"].where)
+    joints, weights = np.empty(shape, np.int32), np.empty(shape, np.float64)
+    for start in range(0, len(used), VERTEX_CHUNK):
+        rows = slice(start, start + VERTEX_CHUNK)
+        for column, i in enumerate(sets):
+            chunk = np.s_[rows, 4 * column : 4 * column + 4]
+            stored = attributes[f"JOINTS_{i}"].stored[used[rows]].astype(np.int64)
+            weights[chunk] = attributes[f"WEIGHTS_{i}"].as_floats(used[rows])
+            if (
+                (stored < 0).any()
+                or (stored[weights[chunk] > 0.0] >= joint_count).any()
+                or (weights[chunk] < 0.0).any()
+            ):
+                raise SceneFileError(
+                    f"{attributes[f'JOINTS_{i}'].where}: joints must be below {joint_count}, "
+                    "and weights must not be negative"
+                )
+            # The joint of a zero weight may be out of range.
+            joints[chunk] = np.minimum(stored, joint_count - 1)
+    total = weights.sum(axis=1, keepdims=True)
     if not (total > 0.0).all():
         raise SceneFileError(f"{attributes['JOINTS_0'].where}: every vertex must have a weight above zero")
-    # The joint of a zero weight may be out of range. Weights stored as bytes do not sum to exactly 1.
-    chosen = np.minimum(np.concatenate(joints, axis=1), joint_count - 1).astype(np.int32)
-    return chosen, all_weights / total
+    weights /= total  # weights stored as bytes do not sum to exactly 1
+    return joints, weights
 
 
 def skinned(
@@ -175,16 +212,19 @@ def skinned(
         weights: each row sums to 1.
         joint_to_world: world matrix times inverse bind matrix of each joint.
     """
-    blended = np.zeros((len(positions), 3, 4))
-    for k in range(joints.shape[1]):
-        blended += weights[:, k, None, None] * joint_to_world[joints[:, k], :3]
-    placed = np.einsum("nij,nj->ni", blended[:, :, :3], positions.astype(np.float64)) + blended[:, :, 3]
-    if normals is None:
-        return placed.astype(np.float32), None
-    # As in `renderer.scene.scene.transform_normals`.
-    rows = blended[:, 0, :3], blended[:, 1, :3], blended[:, 2, :3]
-    cofactors = np.stack(
-        [np.cross(rows[1], rows[2]), np.cross(rows[2], rows[0]), np.cross(rows[0], rows[1])], axis=1
-    )
-    turned, _ = unit_rows(np.einsum("nij,nj->ni", cofactors, normals.astype(np.float64)))
-    return placed.astype(np.float32), turned
+    placed = np.empty_like(positions)
+    turned = None if normals is None else np.empty_like(normals)
+    for start in range(0, len(positions), VERTEX_CHUNK):
+        rows = slice(start, start + VERTEX_CHUNK)
+        blended = np.zeros((len(positions[rows]), 3, 4))
+        for k in range(joints.shape[1]):
+            blended += weights[rows, k, None, None] * joint_to_world[joints[rows, k], :3]
+        moved = np.einsum("nij,nj->ni", blended[:, :, :3], positions[rows].astype(np.float64))
+        placed[rows] = moved + blended[:, :, 3]
+        if normals is None or turned is None:
+            continue
+        # As in `renderer.scene.scene.transform_normals`.
+        x, y, z = blended[:, 0, :3], blended[:, 1, :3], blended[:, 2, :3]
+        cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=1)
+        turned[rows], _ = unit_rows(np.einsum("nij,nj->ni", cofactors, normals[rows].astype(np.float64)))
+    return placed, turned

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
-from vpltune.renderer.scene.files.json_object import JsonObject, parse_json
+from vpltune.renderer.scene.files.json_object import JsonObject, JsonObjects, parse_json
 from vpltune.renderer.scene.files.limits import DecodedBytes
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
 
@@ -49,6 +49,11 @@ IRRELEVANT_EXTENSIONS = frozenset(
     }
 )
 
+# What to do about an extension that files often require and that is not supported.
+_REMEDIES = {
+    "KHR_texture_basisu": "convert the textures from KTX2 to PNG or JPEG and leave the extension out",
+}
+
 
 @dataclass(frozen=True)
 class GltfDocument:
@@ -60,17 +65,14 @@ class GltfDocument:
     """The BIN chunk of a .glb, or None."""
     warnings: Warnings
     decoded: DecodedBytes = field(default_factory=DecodedBytes)
-    _lists: dict[str, list[JsonObject]] = field(default_factory=dict)
 
-    def list_of(self, kind: str) -> list[JsonObject]:
+    def list_of(self, kind: str) -> JsonObjects:
         """A top-level list such as "nodes"; empty if the file has none.
 
         Raises:
-            SceneFileError: the value is not a list of objects.
+            SceneFileError: the value is not a list.
         """
-        if kind not in self._lists:
-            self._lists[kind] = self.root.objects(kind)
-        return self._lists[kind]
+        return self.root.objects(kind)
 
     def referred(self, holder: JsonObject, key: str, kind: str) -> JsonObject | None:
         """The member of the list `kind` to which `key` of `holder` refers; None if the key is absent.
@@ -151,7 +153,10 @@ def _check_extensions(document: GltfDocument) -> None:
     required = document.required_extensions
     for name in required:
         if name not in known:
-            raise SceneFileError(f"extensionsRequired: {name!r:.80} is not supported")
+            remedy = _REMEDIES.get(name)
+            raise SceneFileError(
+                f"extensionsRequired: {name!r:.80} is not supported{f'; {remedy}' if remedy else ''}"
+            )
     for name in document.root.strings("extensionsUsed"):
         if name not in known and name not in required:
             document.warnings.add(f"extension {name!r:.80} is ignored")

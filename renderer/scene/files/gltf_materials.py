@@ -19,6 +19,9 @@ _WRAPS: dict[int, Wrap] = {33071: "clamp_to_edge", 33648: "mirrored_repeat", 104
 # And of nearest filters.
 _NEAREST_FILTERS = (9728, 9984, 9986)
 
+# Extensions in place of metallic-roughness, so that its metallicFactor says nothing.
+_WITHOUT_METAL = ("KHR_materials_pbrSpecularGlossiness", "KHR_materials_unlit")
+
 
 @dataclass(frozen=True, eq=False)
 class BaseColor:
@@ -100,6 +103,7 @@ class GltfMaterials:
                 "1 material emits light; emission does not light the scene yet",
                 "{n} materials emit light; emission does not light the scene yet",
             )
+        self._warn_of_metal(material)
         if material.string("alphaMode", "OPAQUE") != "OPAQUE":
             warnings.tally(
                 "1 material has an alpha mode; it is drawn opaque",
@@ -116,6 +120,20 @@ class GltfMaterials:
                 "1 material is marked unlit; it is lit like any other",
                 "{n} materials are marked unlit; they are lit like any other",
             )
+
+    def _warn_of_metal(self, material: JsonObject) -> None:
+        holder = material.object("pbrMetallicRoughness")
+        # By the letter, what leaves the whole object out is a white metal: a placeholder, not worth a word.
+        if holder is None or any(map(material.extension, _WITHOUT_METAL)):
+            return
+        if holder.number("metallicFactor", 1.0) <= 0.0:
+            return
+        by = " by its texture" if holder.object("metallicRoughnessTexture") is not None else ""
+        self._document.warnings.tally(
+            f"1 material is metallic{by}; it is drawn matt, in its base colour",
+            f"{{n}} materials are metallic{by.replace('its', 'their')}; they are drawn matt, in their base "
+            "colours",
+        )
 
     def _texture(self, info: JsonObject) -> int | None:
         textures = self._document.list_of("textures")

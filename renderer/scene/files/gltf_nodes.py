@@ -18,11 +18,11 @@ class GltfNodes:
     """
 
     def __init__(self, document: GltfDocument) -> None:
-        count = len(document.root.members.get("nodes", ()))
+        self.nodes = document.list_of("nodes")
+        count = len(self.nodes)
         if count > MAX_NODES:
             raise SceneFileError(f"nodes: must be at most {MAX_NODES:,}, got {count:,}")
         self._document = document
-        self.nodes = document.list_of("nodes")
         self.children = [node.indices("children", count, "nodes") for node in self.nodes]
         self.parents = self._checked_parents()
         self._world: dict[int, Float64[np.ndarray, "4 4"]] = {}
@@ -31,7 +31,7 @@ class GltfNodes:
         """Indices of the visible nodes of the active scene, parents before children.
 
         Raises:
-            SceneFileError: the scene names a node twice, a node with a parent, or one out of range.
+            SceneFileError: the scene names a node twice, or one out of range.
         """
         pending = self._roots()[::-1]
         order = []
@@ -67,6 +67,16 @@ class GltfNodes:
             self._world[at] = matrix
         return matrix
 
+    def with_descendants(self, nodes: set[int]) -> set[int]:
+        """The nodes with these indices and all their descendants."""
+        found = set(nodes)
+        pending = list(nodes)
+        while pending:
+            below = [child for child in self.children[pending.pop()] if child not in found]
+            found.update(below)
+            pending.extend(below)
+        return found
+
     def _roots(self) -> list[int]:
         scenes = self._document.list_of("scenes")
         if not scenes:
@@ -82,14 +92,18 @@ class GltfNodes:
                     f"the file selects none of its {len(scenes)} scenes: the first one is read"
                 )
         roots = scene.indices("nodes", len(self.nodes), "nodes")
-        for root in roots:
-            if self.parents[root] >= 0:
-                raise SceneFileError(
-                    f"{scene.at('nodes')}: must be root nodes, got {root}, a child of another"
-                )
-        if len(set(roots)) != len(roots):
+        named = set(roots)
+        if len(named) != len(roots):
             raise SceneFileError(f"{scene.at('nodes')}: must not name a node twice")
-        return roots
+        children = [root for root in roots if self.parents[root] >= 0]
+        if not children:
+            return roots
+        self._document.warnings.add(
+            f"{scene.at('nodes')}: must be root nodes, and {len(children)} of them have a parent, such as "
+            f"{children[0]}; each node is drawn once, where its parents place it"
+        )
+        below = self.with_descendants({child for root in roots for child in self.children[root]})
+        return [root for root in roots if root not in below]
 
     def _checked_parents(self) -> list[int]:
         parents = [-1] * len(self.nodes)

@@ -9,9 +9,10 @@ from vpltune.renderer.scene.files.diagnostics import SceneFileError
 from vpltune.renderer.scene.files.gltf_accessors import Elements, GltfAccessors
 from vpltune.renderer.scene.files.gltf_deformation import Deformation, morphed, read_influences, skinned
 from vpltune.renderer.scene.files.gltf_document import GltfDocument
-from vpltune.renderer.scene.files.gltf_draco import decode_draco
+from vpltune.renderer.scene.files.gltf_draco import DracoDecoder, decode_draco
 from vpltune.renderer.scene.files.gltf_materials import BaseColor, transformed_uv
 from vpltune.renderer.scene.files.json_object import JsonObject
+from vpltune.renderer.scene.files.limits import MAX_MORPH_BYTES, DecodedBytes
 from vpltune.renderer.scene.files.surface import Surface, finished_mesh, used_vertices
 from vpltune.renderer.scene.scene import Mesh
 from vpltune.renderer.scene.scene_animation import Skinning
@@ -33,9 +34,11 @@ _ATTRIBUTE_TYPES = {
 class GltfPrimitives:
     """Reads the mesh primitives of one document."""
 
-    def __init__(self, document: GltfDocument, accessors: GltfAccessors) -> None:
+    def __init__(self, document: GltfDocument, accessors: GltfAccessors, draco: DracoDecoder) -> None:
         self._document = document
         self._accessors = accessors
+        self._draco = draco
+        self._morphs = DecodedBytes(MAX_MORPH_BYTES, "morph targets")
 
     def is_surface(self, primitive: JsonObject) -> bool:
         """Whether a primitive has triangles with positions. If not, this adds a warning.
@@ -102,7 +105,7 @@ class GltfPrimitives:
                     f"{primitive.at('mode')}: Draco geometry is read as triangles (mode 4) only"
                 )
             attributes, corners = decode_draco(
-                self._accessors, primitive, compression, self._document.decoded
+                self._accessors, primitive, compression, self._document.decoded, self._draco
             )
         holder = primitive.required_object("attributes")
         for semantic in holder.members:
@@ -117,12 +120,21 @@ class GltfPrimitives:
                     f"got {len(elements)}"
                 )
         if corners is None:
+            if "NORMAL" not in attributes and primitive.integer("mode", _TRIANGLES) == _TRIANGLES:
+                self._require_flat(primitive, vertex_count)
             corners = self._corners(primitive, vertex_count)
         if corners.min() < 0 or corners.max() >= vertex_count:
             raise SceneFileError(
                 f"{primitive.at('indices')}: must be below the {vertex_count} vertices, got {corners.max()}"
             )
         return attributes, corners
+
+    def _require_flat(self, primitive: JsonObject, vertex_count: int) -> None:
+        """Refuse a flat mesh that is too large from its count alone: each corner becomes a vertex."""
+        indexed = "indices" in primitive.members
+        corner_count = self._accessors.count(primitive, "indices") if indexed else vertex_count
+        # Indices twice in 8 bytes, then position, normal and index.
+        self._document.decoded.require((16 + 24 + 4) * corner_count, primitive.where)
 
     def _corners(self, primitive: JsonObject, vertex_count: int) -> Int64[np.ndarray, " corners"]:
         if "indices" not in primitive.members:
@@ -134,10 +146,10 @@ class GltfPrimitives:
             raise SceneFileError(
                 f"{indices.where}: indices must be plain unsigned integers, got {stored.dtype.name}"
             )
+        self._document.decoded.spend(8 * len(stored), indices.where)
         largest = np.iinfo(stored.dtype).max
         if (stored == largest).any():
             raise SceneFileError(f"{indices.where}: must not hold {largest}, which means primitive restart")
-        self._document.decoded.spend(8 * len(stored), indices.where)
         return stored.astype(np.int64)
 
     def _at_rest(
@@ -158,14 +170,23 @@ class GltfPrimitives:
                     )
                 vertex_count = len(attributes[semantic])
                 placed[semantic] = morphed(
-                    base, semantic, primitive, deformation.weights, self._accessors, used, vertex_count
+                    base,
+                    semantic,
+                    primitive,
+                    deformation.weights,
+                    self._accessors,
+                    used,
+                    vertex_count,
+                    self._morphs,
                 )
         positions, normals = placed["POSITION"], placed.get("NORMAL")
-        if deformation.joint_to_world is None or "JOINTS_0" not in attributes:
+        if deformation.skin is None or "JOINTS_0" not in attributes:
             return positions, normals, None
-        joints, weights = read_influences(attributes, used, len(deformation.joint_to_world))
-        at_rest = skinned(positions, normals, joints, weights, deformation.joint_to_world)
-        if not deformation.is_animated:
+        joints, weights = read_influences(
+            attributes, used, len(deformation.skin.joints), self._document.decoded
+        )
+        at_rest = skinned(positions, normals, joints, weights, deformation.skin.joint_to_world)
+        if not deformation.skin.is_animated:
             return *at_rest, None
         bind_normals = np.zeros_like(positions) if normals is None else normals
         return *at_rest, Skinning(positions, bind_normals, joints, weights.astype(np.float32))
@@ -203,7 +224,7 @@ class GltfPrimitives:
 def _is_wanted(semantic: str, base_color: BaseColor, deformation: Deformation) -> bool:
     if semantic in ("POSITION", "NORMAL", "COLOR_0"):
         return True
-    if deformation.joint_to_world is not None and re.fullmatch(r"(JOINTS|WEIGHTS)_\d", semantic):
+    if deformation.skin is not None and re.fullmatch(r"(JOINTS|WEIGHTS)_\d", semantic):
         return True
     return base_color.uv_set is not None and semantic == f"TEXCOORD_{base_color.uv_set}"
 

@@ -1,5 +1,6 @@
 """Conversion of a glTF document to a scene: the meshes, lights and cameras of the active scene's nodes."""
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -7,15 +8,16 @@ from jaxtyping import Float64
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, label
 from vpltune.renderer.scene.files.gltf_accessors import GltfAccessors
-from vpltune.renderer.scene.files.gltf_animations import Placed, moving_nodes, placed_animation, read_channels
-from vpltune.renderer.scene.files.gltf_deformation import Deformation, read_deformation, read_skin
+from vpltune.renderer.scene.files.gltf_animations import Placed, placed_animation, read_channels
+from vpltune.renderer.scene.files.gltf_deformation import Deformation, GltfDeformations, RestSkin
 from vpltune.renderer.scene.files.gltf_document import GltfDocument, open_gltf
+from vpltune.renderer.scene.files.gltf_draco import DracoDecoder
 from vpltune.renderer.scene.files.gltf_lights_cameras import read_camera, read_light
 from vpltune.renderer.scene.files.gltf_materials import GltfMaterials
 from vpltune.renderer.scene.files.gltf_nodes import GltfNodes
 from vpltune.renderer.scene.files.gltf_primitives import GltfPrimitives
-from vpltune.renderer.scene.files.json_object import JsonObject
-from vpltune.renderer.scene.files.limits import MAX_INSTANCES
+from vpltune.renderer.scene.files.json_object import JsonObject, JsonObjects
+from vpltune.renderer.scene.files.limits import MAX_CAMERAS, MAX_INSTANCES, MAX_LIGHTS
 from vpltune.renderer.scene.scene import Camera, Instance, Light, Mesh, Scene, trs_matrices
 
 
@@ -31,9 +33,10 @@ def read_gltf(path: Path, warnings: Warnings) -> Scene:
             `renderer.scene.files.limits`.
     """
     document = open_gltf(path, warnings)
-    builder = _SceneBuilder(document)
-    for index in builder.nodes.shown():
-        builder.add_node(index)
+    with DracoDecoder() as draco:
+        builder = _SceneBuilder(document, draco)
+        for index in builder.nodes.shown():
+            builder.add_node(index)
     return Scene(
         name=label(path.stem, "scene"),
         meshes=tuple(builder.meshes),
@@ -48,21 +51,24 @@ def read_gltf(path: Path, warnings: Warnings) -> Scene:
 
 
 class _SceneBuilder:
-    def __init__(self, document: GltfDocument) -> None:
+    def __init__(self, document: GltfDocument, draco: DracoDecoder) -> None:
         self.document = document
         self.nodes = GltfNodes(document)
         self.accessors = GltfAccessors(document)
         self.materials = GltfMaterials(document, self.accessors)
-        self.primitives = GltfPrimitives(document, self.accessors)
+        self.primitives = GltfPrimitives(document, self.accessors, draco)
         self.meshes: list[Mesh] = []
         self.instances: list[Instance] = []
         self.lights: list[Light] = []
         self.cameras: list[Camera] = []
         self.channels = read_channels(document, self.nodes, self.accessors)
         self.placed = Placed()
-        self._skins: dict[str, int] = {}
-        self._moving_nodes = moving_nodes(self.channels, self.nodes)
-        self._meshes_at_rest: dict[tuple[str, str], int | None] = {}
+        moving = self.nodes.with_descendants({channel.node for channel in self.channels})
+        self.deformations = GltfDeformations(document, self.nodes, self.accessors, moving)
+        self._surfaces: dict[str, list[JsonObject]] = {}
+        self._skins: dict[RestSkin, int] = {}
+        self._meshes_at_rest: dict[tuple[str, Deformation], int | None] = {}
+        self._placed: Counter[str] = Counter()
 
     def add_node(self, index: int) -> None:
         node = self.nodes.nodes[index]
@@ -72,60 +78,71 @@ class _SceneBuilder:
         if mesh is not None:
             self._add_mesh(index, node, mesh)
         if camera is not None:
+            self._count(1, "cameras", MAX_CAMERAS)
             filming = read_camera(camera, self.nodes.to_world(index), self.document)
             if filming is not None:
                 self.cameras.append(filming)
                 self.placed.camera_nodes.append(index)
         if light is not None:
+            self._count(1, "lights", MAX_LIGHTS)
             shining = read_light(light, self.nodes.to_world(index), self.document)
             if shining is not None:
                 self.lights.append(shining)
                 self.placed.light_nodes.append(index)
+
+    def _count(self, added: int, what: str, most: int) -> None:
+        # What a node places counts even if nothing of it is drawn: it takes its time all the same.
+        self._placed[what] += added
+        if self._placed[what] > most:
+            raise SceneFileError(f"nodes: must place at most {most:,} {what} in all")
 
     def _light_of(self, node: JsonObject) -> JsonObject | None:
         reference = node.extension("KHR_lights_punctual")
         if reference is None:
             return None
         extension = self.document.root.extension("KHR_lights_punctual")
-        lights = [] if extension is None else extension.objects("lights")
+        lights = JsonObjects([], "") if extension is None else extension.objects("lights")
         return lights[reference.required_index("light", len(lights), "lights")]
 
     def _add_mesh(self, index: int, node: JsonObject, mesh: JsonObject) -> None:
-        deformation = read_deformation(
-            node, mesh, self.document, self.nodes, self.accessors, self._moving_nodes
-        )
+        primitives = self._surfaces_of(mesh)
+        if not primitives:
+            return
+        deformation = self.deformations.of(node, mesh)
         # Only joints place a skinned mesh; its node's transform is ignored (glTF 2.0 section 3.7.3).
-        is_placed_by_joints = deformation.joint_to_world is not None
-        local = np.eye(4)[None] if is_placed_by_joints else self._placements(index, node)
+        is_placed_by_joints = deformation.skin is not None
+        local = np.eye(4)[None] if is_placed_by_joints else self._local_placements(node)
+        self._count(len(primitives) * len(local), "primitives", MAX_INSTANCES)
+        if not is_placed_by_joints:
+            local = self._with_area(local, self.nodes.to_world(index))
         to_world = local if is_placed_by_joints else self.nodes.to_world(index) @ local
         name = label(node.string("name", ""), node.where)
-        primitives = [p for p in mesh.objects("primitives") if self.primitives.is_surface(p)]
-        if len(self.instances) + len(primitives) * len(to_world) > MAX_INSTANCES:
-            raise SceneFileError(f"nodes: must place at most {MAX_INSTANCES:,} primitives in all")
-        skin = self._skin_of(node) if deformation.is_animated else -1
         for primitive in primitives:
-            at = self._mesh_at_rest(node, primitive, mesh, deformation)
+            at = self._mesh_at_rest(primitive, mesh, deformation)
             if at is not None:
                 self.instances += [Instance(name, at, matrix) for matrix in to_world]
                 self.placed.instance_nodes += [-1 if is_placed_by_joints else index] * len(to_world)
                 self.placed.instance_local += list(local)
                 is_bent = self.meshes[at].skinning is not None
-                self.placed.instance_skins += [skin if is_bent else -1] * len(to_world)
+                skin = self._placed_skin(deformation.skin) if is_bent and deformation.skin else -1
+                self.placed.instance_skins += [skin] * len(to_world)
 
-    def _skin_of(self, node: JsonObject) -> int:
-        skin = self.document.referred(node, "skin", "skins")
-        assert skin is not None
-        if skin.where not in self._skins:
-            self._skins[skin.where] = len(self.placed.skins)
-            self.placed.skins.append(read_skin(skin, self.nodes, self.accessors))
-        return self._skins[skin.where]
+    def _surfaces_of(self, mesh: JsonObject) -> list[JsonObject]:
+        if mesh.where not in self._surfaces:
+            self._surfaces[mesh.where] = [
+                primitive for primitive in mesh.objects("primitives") if self.primitives.is_surface(primitive)
+            ]
+        return self._surfaces[mesh.where]
 
-    def _mesh_at_rest(
-        self, node: JsonObject, primitive: JsonObject, mesh: JsonObject, deformation: Deformation
-    ) -> int | None:
+    def _placed_skin(self, skin: RestSkin) -> int:
+        if skin not in self._skins:
+            self._skins[skin] = len(self.placed.skins)
+            self.placed.skins.append((skin.joints, skin.inverse_bind))
+        return self._skins[skin]
+
+    def _mesh_at_rest(self, primitive: JsonObject, mesh: JsonObject, deformation: Deformation) -> int | None:
         # Nodes share a mesh unless they deform it differently.
-        is_own = deformation.joint_to_world is not None or "weights" in node.members
-        key = (primitive.where, node.where if is_own else "")
+        key = (primitive.where, deformation)
         if key not in self._meshes_at_rest:
             base_color = self.materials.of(primitive)
             name = label(mesh.string("name", ""), mesh.where)
@@ -134,15 +151,17 @@ class _SceneBuilder:
             self.meshes += [] if read is None else [read]
         return self._meshes_at_rest[key]
 
-    def _placements(self, index: int, node: JsonObject) -> Float64[np.ndarray, "placements 4 4"]:
-        """Transforms from the instances of EXT_mesh_gpu_instancing to the node; without it, the identity.
-
-        Instances whose scale leaves no area are dropped with a warning.
-        """
+    def _local_placements(self, node: JsonObject) -> Float64[np.ndarray, "placements 4 4"]:
+        """Transforms from the instances of EXT_mesh_gpu_instancing to the node; without it, the identity."""
         instancing = node.extension("EXT_mesh_gpu_instancing")
-        local = np.eye(4)[None] if instancing is None else self._instance_matrices(instancing)
+        return np.eye(4)[None] if instancing is None else self._instance_matrices(instancing)
+
+    def _with_area(
+        self, local: Float64[np.ndarray, "placements 4 4"], to_world: Float64[np.ndarray, "4 4"]
+    ) -> Float64[np.ndarray, "kept 4 4"]:
+        """The placements on a node whose scale leaves area; the others are dropped with a warning."""
         # A surface has area if two singular values are above zero. 1e-12 is far below float32's resolution.
-        stretch = np.linalg.svd((self.nodes.to_world(index) @ local)[:, :3, :3], compute_uv=False)
+        stretch = np.linalg.svd((to_world @ local)[:, :3, :3], compute_uv=False)
         is_surface = stretch[:, 1] > 1e-12 * stretch[:, 0]
         for _ in range(int((~is_surface).sum())):
             self.document.warnings.tally(

@@ -2,7 +2,8 @@
 
 import json
 import math
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +12,7 @@ from jaxtyping import Float64
 
 from vpltune.renderer.files.strict_json import DuplicateKeyError, unique_keys
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
-from vpltune.renderer.scene.files.limits import MAX_JSON_VALUES
+from vpltune.renderer.scene.files.limits import MAX_JSON_BYTES, MAX_JSON_VALUES
 
 # A choice: numbers beyond this are rejected, so that sums and products stay finite in float64.
 _LARGEST_NUMBER = 1e30
@@ -44,10 +45,9 @@ class JsonObject:
         """An object."""
         return _as_object(self._required(key), self.at(key))
 
-    def objects(self, key: str) -> list["JsonObject"]:
+    def objects(self, key: str) -> "JsonObjects":
         """A list of objects; empty if the key is absent."""
-        place = self.at(key)
-        return [_as_object(item, f"{place}[{i}]") for i, item in enumerate(self._list(key))]
+        return JsonObjects(self._list(key), self.at(key))
 
     def extension(self, name: str) -> "JsonObject | None":
         """The object `extensions.<name>` of glTF; None if it is absent."""
@@ -138,19 +138,53 @@ class JsonObject:
         return SceneFileError(f"{self.at(key)}: must be {rule}, got {shown(value)}")
 
 
+class JsonObjects:
+    """A list of JSON objects. Each is checked and wrapped when it is asked for.
+
+    Many members refer into one long list, so taking the list again must not cost its length.
+    """
+
+    __slots__ = ("_members", "_where")
+
+    def __init__(self, members: list[Any], where: str) -> None:
+        self._members = members
+        self._where = where
+
+    def __len__(self) -> int:
+        return len(self._members)
+
+    def __getitem__(self, index: int) -> JsonObject:
+        """The object with that index.
+
+        Raises:
+            SceneFileError: this member is not an object.
+        """
+        return _as_object(self._members[index], f"{self._where}[{index}]")
+
+    def __iter__(self) -> Iterator[JsonObject]:
+        return (self[index] for index in range(len(self)))
+
+
 def parse_json(content: bytes) -> JsonObject:
     """Parse a JSON document whose top-level value is an object.
 
     Raises:
         SceneFileError: the content is not JSON in UTF-8, a key appears twice in one object, a number is not
-            finite in double precision, nesting is too deep, or there are too many values.
+            finite in double precision, nesting is too deep, or the text or its values are too many.
     """
     # The number of commas and opening brackets is an upper bound for the number of values.
     if sum(content.count(mark) for mark in (b",", b"{", b"[")) > MAX_JSON_VALUES:
         raise SceneFileError(f"the document: must hold at most {MAX_JSON_VALUES:,} JSON values")
     try:
+        text = content.decode("utf-8-sig")  # glTF lets a reader ignore a byte order mark
+        # One wide character makes Python keep every character of the text in up to four bytes.
+        if sys.getsizeof(text) > MAX_JSON_BYTES:
+            raise SceneFileError(
+                f"the document: JSON must take at most {MAX_JSON_BYTES >> 20} MiB as text, "
+                f"got {sys.getsizeof(text) >> 20} MiB; put large buffers into a .glb or .bin"
+            )
         document = json.loads(
-            content.decode("utf-8-sig"),  # glTF lets a reader ignore a byte order mark
+            text,
             object_pairs_hook=unique_keys,
             parse_constant=_no_constant,
             parse_float=_finite_float,

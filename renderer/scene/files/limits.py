@@ -8,6 +8,9 @@ MAX_FILE_BYTES = 1 << 29
 MAX_DECODED_BYTES = 1 << 29
 """A choice: all vertex and index arrays, the other half. That is about six million flat-shaded triangles."""
 
+MAX_JSON_BYTES = 1 << 27
+"""A choice: JSON text in memory. File, text, a string of it and what that encodes lie side by side."""
+
 MAX_JSON_VALUES = 2_000_000
 """A choice. Python needs about 100 bytes and 0.5 µs for each value."""
 
@@ -16,6 +19,24 @@ MAX_NODES = 1 << 17
 
 MAX_INSTANCES = 10_000
 """A choice. Each instance is a draw call in every pass."""
+
+MAX_CAMERAS = 10_000
+"""A choice. Each takes about 30 µs to place."""
+
+MAX_LIGHTS = 10_000
+"""A choice. Each takes about 50 µs to place."""
+
+MAX_MORPH_BYTES = 1 << 29
+"""A choice: displacements of morph targets, as floats. Many targets may share the bytes of one accessor."""
+
+DRACO_SECONDS = 1
+"""A choice: processor time that decoding a Draco bitstream may take whatever its length."""
+
+DRACO_BYTES_PER_SECOND = 1 << 18
+"""A choice: further time for its length. Measured: 22 MB/s; a slow machine has a factor of eighty."""
+
+VERTEX_CHUNK = 1 << 18
+"""A choice: vertices skinned at a time. It keeps the matrices of a large mesh below about 100 MiB."""
 
 MAX_CHANNELS = 10_000
 """A choice: animation channels, which take about 50 µs each to read."""
@@ -41,6 +62,9 @@ A photograph has 2 to 10 texels per byte. A file that unpacks a kilobyte to a me
 LARGEST_COORDINATE = 1e15
 """A choice, in world units: its square fits a float32 with eight decades to spare."""
 
+LARGEST_NORMAL = 3.4e38
+"""Largest component of a normal before it is scaled to unit length: any that float32 can hold."""
+
 SMALLEST_EXTENT = 1e-15
 """A choice: smallest diagonal of a scene in world units. Areas in a smaller scene underflow in float32."""
 
@@ -49,13 +73,19 @@ LARGEST_RADIOMETRIC = 1e18
 
 
 class DecodedBytes:
-    """The memory budget for decoded arrays while one scene is read, `MAX_DECODED_BYTES` at the start."""
+    """A budget of bytes while one scene is read.
 
-    def __init__(self) -> None:
-        self._left = MAX_DECODED_BYTES
+    Args:
+        most: bytes at the start; the default is for the arrays of all geometry.
+        what: what takes them, for the message.
+    """
 
-    def spend(self, count: int, where: str) -> None:
-        """Take `count` bytes from the budget.
+    def __init__(self, most: int = MAX_DECODED_BYTES, what: str = "geometry") -> None:
+        self._most = self._left = most
+        self._what = what
+
+    def require(self, count: int, where: str) -> None:
+        """Check that `count` bytes are left, and take none.
 
         Args:
             count: bytes.
@@ -66,7 +96,11 @@ class DecodedBytes:
         """
         if count > self._left:
             raise SceneFileError(
-                f"{where}: geometry must take at most {MAX_DECODED_BYTES >> 20} MiB once decoded, and this "
+                f"{where}: {self._what} must take at most {self._most >> 20} MiB once decoded, and this "
                 f"needs {count >> 20} MiB with {self._left >> 20} MiB left"
             )
+
+    def spend(self, count: int, where: str) -> None:
+        """Take `count` bytes from the budget; like `require`."""
+        self.require(count, where)
         self._left -= count

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vpltune.renderer.errors import InputError
+from vpltune.renderer.errors import InputError, MachineError
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, one_line
 from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, SMALLEST_EXTENT
 from vpltune.renderer.scene.scene import Scene
@@ -36,11 +36,20 @@ def read_scene(path: str | Path) -> Scene:
         with np.errstate(all="ignore"):
             scene = read(path, Warnings())
             _check_whole(scene)
-    except SceneFileError as error:
-        raise InputError(one_line(f"{path}: ", 4096) + one_line(str(error))) from error
-    except MemoryError as error:
-        raise InputError(one_line(f"{path}: ", 4096) + "does not fit into memory") from error
+    except (ImportError, InputError, MachineError):
+        raise
+    except Exception as error:
+        raise InputError(one_line(f"{path}: ", 4096) + one_line(_cause(error))) from error
     return scene
+
+
+def _cause(error: Exception) -> str:
+    """What is wrong with the file, whatever a reader or a library below it raised."""
+    if isinstance(error, SceneFileError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "does not fit into memory"
+    return f"cannot be read ({type(error).__name__}: {error})"
 
 
 def _reader_for(path: Path) -> Callable[[Path, Warnings], Scene]:

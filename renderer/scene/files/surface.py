@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int64
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
-from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, DecodedBytes
+from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, LARGEST_NORMAL, DecodedBytes
 from vpltune.renderer.scene.scene import Mesh
 from vpltune.renderer.scene.scene_animation import Skinning
 
@@ -51,6 +51,7 @@ def finished_mesh(
     """
     for values, what, largest in (
         (surface.positions, "positions", LARGEST_COORDINATE),
+        (surface.normals, "normals", LARGEST_NORMAL),
         (surface.uv, "uv", 1e9),
     ):
         if values is not None and values.size and not np.abs(values).max() <= largest:
@@ -61,13 +62,18 @@ def finished_mesh(
     if not has_area.all():
         surface = replace(surface, triangles=surface.triangles[has_area])
         face_normals = face_normals[has_area]
+    per_vertex = 24 + 8 * (surface.uv is not None) + 12 * (surface.colors is not None)
+    decoded.spend(12 * len(surface.triangles), where)
     if surface.normals is None:
+        decoded.spend(per_vertex * surface.triangles.size, where)
         surface, normals = _flat(surface, face_normals)
     else:
-        surface, normals = _smooth(_without_unused_vertices(surface), face_normals)
+        surface = _without_unused_vertices(surface)
+        unit, has_normal = unit_rows(surface.normals.astype(np.float64))
+        lacking = ~has_normal[surface.triangles]
+        decoded.spend(per_vertex * (len(unit) + int(lacking.sum())), where)
+        surface, normals = _smooth(surface, unit, lacking, face_normals)
     vertices = len(surface.positions)
-    decoded.spend(vertices * (24 + 8 * (surface.uv is not None) + 12 * (surface.colors is not None)), where)
-    decoded.spend(12 * len(surface.triangles), where)
     # Absent attributes are one broadcast row: most scenes have no vertex colours.
     uv = np.broadcast_to(np.zeros(2, np.float32), (vertices, 2)) if surface.uv is None else surface.uv
     colors = (
@@ -120,11 +126,11 @@ def _flat(
 
 
 def _smooth(
-    surface: Surface, face_normals: Float32[np.ndarray, "triangles 3"]
-) -> tuple[Surface, Float32[np.ndarray, "vertices 3"]]:
-    assert surface.normals is not None
-    normals, has_normal = unit_rows(surface.normals.astype(np.float64))
-    lacking = ~has_normal[surface.triangles]
+    surface: Surface,
+    normals: Float32[np.ndarray, "vertices 3"],
+    lacking: Bool[np.ndarray, "triangles 3"],
+    face_normals: Float32[np.ndarray, "triangles 3"],
+) -> tuple[Surface, Float32[np.ndarray, "vertices_and_corners 3"]]:
     if not lacking.any():
         return surface, normals
     # Each corner that gets its triangle's normal needs its own vertex.

@@ -12,6 +12,8 @@ from vpltune.renderer.scene.scene import Scene, transform_points
 # Most surface samples of one grid; scenes that would need more get a coarser grid. 2²⁴ samples take about a
 # second.
 SAMPLE_BUDGET = 2**24
+# A choice: samples that a triangle may have on average, however many triangles there are. The smallest has 4.
+SAMPLES_PER_TRIANGLE = 6
 # A choice: samples processed at a time, to bound memory.
 SAMPLE_CHUNK = 2**20
 # Largest distance between samples in voxels. They can only miss a voxel whose corner is clipped by less.
@@ -70,8 +72,13 @@ def triangles_in_box(
 
 
 def spacing_within_budget(triangles: PlacedTriangles, voxel: float) -> float:
-    """The edge of a voxel, enlarged until the surfaces need no more than `SAMPLE_BUDGET` samples."""
-    while _sample_counts(triangles.corners, voxel).prod(axis=1, dtype=np.float64).sum() > SAMPLE_BUDGET:
+    """The edge of a voxel, enlarged until the surfaces need no more than `SAMPLE_BUDGET` samples.
+
+    With millions of triangles, until they need `SAMPLES_PER_TRIANGLE` on average: a coarser grid saves little
+    then, and in the end no voxel would be left to place anything in.
+    """
+    budget = max(SAMPLE_BUDGET, SAMPLES_PER_TRIANGLE * len(triangles.corners))
+    while _sample_counts(triangles.corners, voxel).prod(axis=1, dtype=np.float64).sum() > budget:
         voxel *= 1.26
     return voxel
 

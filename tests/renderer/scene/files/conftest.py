@@ -82,7 +82,8 @@ class GltfFile:
             "source": self.add("images", {"bufferView": self.view(image), "mimeType": "image/png"})
         }
         info = {"index": self.add("textures", texture)} | info
-        material = self.add("materials", {"pbrMetallicRoughness": {"baseColorTexture": info}})
+        matt = {"baseColorTexture": info, "metallicFactor": 0}
+        material = self.add("materials", {"pbrMetallicRoughness": matt})
         self.primitive["material"] = material
         return texture
 

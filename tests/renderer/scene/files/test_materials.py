@@ -198,6 +198,23 @@ def test_images_that_no_base_colour_uses_are_not_opened(triangle):
             },
             None,
         ),
+        # The default of metallicFactor is 1 (glTF 2.0 section 3.9.2).
+        (
+            {"pbrMetallicRoughness": {}},
+            "1 material is metallic; it is drawn matt, in its base colour",
+        ),
+        (
+            {"pbrMetallicRoughness": {"metallicFactor": 0.5, "metallicRoughnessTexture": {"index": 0}}},
+            "1 material is metallic by its texture; it is drawn matt, in its base colour",
+        ),
+        (
+            {"pbrMetallicRoughness": {"metallicFactor": 0, "metallicRoughnessTexture": {"index": 0}}},
+            None,
+        ),
+        (
+            {"pbrMetallicRoughness": {}, "extensions": {"KHR_materials_unlit": {}}},
+            "1 material is marked unlit; it is lit like any other",
+        ),
     ],
 )
 def test_what_a_diffuse_model_leaves_out_is_said(triangle, material, warning):
@@ -211,6 +228,14 @@ def test_like_warnings_are_counted(triangle):
     triangle.primitive["material"] = triangle.add("materials", {"emissiveFactor": [1, 1, 1]})
     assert read_scene(triangle.write()).warnings == (
         "2 materials emit light; emission does not light the scene yet",
+    )
+
+
+def test_metals_are_counted(triangle):
+    for primitive in (triangle.add_primitive(), triangle.primitive):
+        primitive["material"] = triangle.add("materials", {"pbrMetallicRoughness": {"metallicFactor": 1}})
+    assert read_scene(triangle.write()).warnings == (
+        "2 materials are metallic; they are drawn matt, in their base colours",
     )
 
 
@@ -228,6 +253,12 @@ def test_unknown_extensions_are_refused_where_required_and_else_said(triangle):
     assert read_scene(triangle.write()).warnings == ("extension 'VENDOR_thing' is ignored",)
     triangle.document["extensionsRequired"] = ["VENDOR_thing"]
     with pytest.raises(InputError, match="extensionsRequired: 'VENDOR_thing' is not supported"):
+        read_scene(triangle.write())
+
+
+def test_a_required_extension_that_needs_other_textures_says_what_to_do(triangle):
+    triangle.document["extensionsUsed"] = triangle.document["extensionsRequired"] = ["KHR_texture_basisu"]
+    with pytest.raises(InputError, match="'KHR_texture_basisu' is not supported; convert .* to PNG or JPEG"):
         read_scene(triangle.write())
 
 

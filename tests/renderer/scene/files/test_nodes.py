@@ -156,11 +156,22 @@ def test_broken_hierarchies_are_refused(triangle, nodes, message):
         read_scene(triangle.write())
 
 
-def test_a_scene_that_names_a_child_is_refused(triangle):
-    triangle.document["nodes"] = [{"children": [1]}, {"mesh": 0}]
-    triangle.document["scenes"] = [{"nodes": [0, 1]}]
-    with pytest.raises(InputError, match=r"scenes\[0\]\.nodes: must be root nodes, got 1"):
-        read_scene(triangle.write())
+@pytest.mark.parametrize("listed", [[0, 1, 2], [2, 1, 0], [2, 0]])
+def test_a_scene_that_lists_children_draws_each_node_once(triangle, listed):
+    parent = {"children": [1], "translation": [1, 0, 0]}
+    triangle.document["nodes"] = [parent, {"mesh": 0, "children": [2]}, {"mesh": 0, "translation": [2, 0, 0]}]
+    triangle.document["scenes"] = [{"nodes": listed}]
+    scene = read_scene(triangle.write())
+    assert [instance.to_world[0, 3] for instance in scene.instances] == [1.0, 3.0]
+    (warning,) = scene.warnings
+    assert warning.startswith("scenes[0].nodes: must be root nodes, and ")
+
+
+def test_a_listed_child_of_a_node_that_is_not_is_placed_by_it(triangle):
+    triangle.document["nodes"] = [{"children": [1], "translation": [1, 0, 0]}, {"mesh": 0}]
+    triangle.document["scenes"] = [{"nodes": [1]}]
+    (instance,) = read_scene(triangle.write()).instances
+    assert instance.to_world[0, 3] == 1.0
 
 
 def test_a_rotation_off_unit_length_is_normalised_aloud(triangle):

@@ -44,8 +44,11 @@ def write_gltf_extras(scene: Path, output: Path, document: dict[str, Any]) -> No
         holder["extras"] = {**(extras if isinstance(extras, dict) else {}), EXTRAS_KEY: document}
     for referring in (*root.get("buffers", []), *root.get("images", [])):
         if "uri" in referring:
-            referring["uri"] = _moved_uri(referring["uri"], scene.parent, output.parent)
-    text = json.dumps(root, separators=(",", ":"), allow_nan=False).encode("ascii")
+            referring["uri"] = _moved_uri(referring["uri"], scene, output.parent)
+    try:
+        text = json.dumps(root, separators=(",", ":"), allow_nan=False).encode("ascii")
+    except (ValueError, RecursionError) as error:  # a number beyond double precision
+        raise InputError(f"{scene}: cannot be written again as glTF ({error})") from error
     with written_whole(output) as temporary:
         temporary.write_bytes(_glb(text, rest) if rest is not None else text)
 
@@ -79,11 +82,15 @@ def _opened(path: Path) -> tuple[dict[str, Any], bytes | None]:
             raise InputError(f"{path}: GLB: the first chunk must be JSON, and whole")
         content, rest = content[20 : 20 + length], content[20 + length :]
     try:
-        root = json.loads(content)
+        root = json.loads(content, parse_constant=_no_constant)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: not JSON ({error})") from error
     _check_lists(root, path)
     return root, rest
+
+
+def _no_constant(name: str) -> float:
+    raise ValueError(f"{name} is not a JSON number")
 
 
 def _check_lists(root: Any, path: Path) -> None:
@@ -99,14 +106,18 @@ def _check_lists(root: Any, path: Path) -> None:
                 raise InputError(f"{path}: {kind}: uri must be a string")
 
 
-def _moved_uri(uri: str, source: Path, target: Path) -> str:
+def _moved_uri(uri: str, scene: Path, target: Path) -> str:
+    source = scene.parent
     scheme = uri.split(":", 1)[0]
     if uri.startswith("/") or (":" in uri and scheme.isalnum()):
         return uri  # data:, or an absolute place
-    moved = os.path.relpath((source / unquote(uri)).resolve(), target.resolve())
-    # Left as written where it leads the same way: a byte less that another tool could stumble over.
-    same = (source / unquote(uri)).resolve() == (target / unquote(uri)).resolve()
-    return uri if same else quote(Path(moved).as_posix())
+    try:
+        moved = quote(Path(os.path.relpath((source / unquote(uri)).resolve(), target.resolve())).as_posix())
+        # Left as written where it leads the same way: a byte less that another tool could stumble over.
+        same = (source / unquote(uri)).resolve() == (target / unquote(uri)).resolve()
+        return uri if same else moved
+    except (OSError, RuntimeError, ValueError) as error:  # too long, a loop of links, %00, a lone surrogate
+        raise InputError(f"{scene}: uri {uri!r:.80} names no file ({error})") from error
 
 
 def _glb(text: bytes, rest: bytes) -> bytes:

@@ -2,13 +2,14 @@
 
 import importlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from vpltune.renderer.errors import InputError, MachineError
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, one_line
-from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, SMALLEST_EXTENT
+from vpltune.renderer.scene.files.limits import EXACT_EXTENTS, LARGEST_COORDINATE, SMALLEST_EXTENT
 from vpltune.renderer.scene.scene import Scene
 
 # Module and function for each suffix. Modules are loaded on demand, so reading an OBJ does not load Draco.
@@ -34,8 +35,7 @@ def read_scene(path: str | Path) -> Scene:
         read = _reader_for(path)
         # The readers check results for being finite, so overflow on the way needs no warning.
         with np.errstate(all="ignore"):
-            scene = read(path, Warnings())
-            _check_whole(scene)
+            scene = _checked(read(path, Warnings()))
     except (ImportError, InputError, MachineError):
         raise
     except Exception as error:
@@ -62,7 +62,8 @@ def _reader_for(path: Path) -> Callable[[Path, Warnings], Scene]:
     return getattr(importlib.import_module(f"vpltune.renderer.scene.files.{module}"), function)
 
 
-def _check_whole(scene: Scene) -> None:
+def _checked(scene: Scene) -> Scene:
+    """The scene, with a warning if its size is at the edge of what float32 can hold."""
     if not scene.instances:
         hints = f" ({'; '.join(scene.warnings)})" if scene.warnings else ""
         raise SceneFileError(f"the scene has no triangles{hints}")
@@ -71,7 +72,14 @@ def _check_whole(scene: Scene) -> None:
         raise SceneFileError(
             f"the scene must lie within {LARGEST_COORDINATE:g} of the origin, got {low} to {high}"
         )
-    if not np.linalg.norm(high - low) >= SMALLEST_EXTENT:
-        raise SceneFileError(
-            f"the scene must be at least {SMALLEST_EXTENT:g} across, got {np.linalg.norm(high - low):g}"
-        )
+    extent = float(np.linalg.norm(high - low))
+    if not extent >= SMALLEST_EXTENT:
+        raise SceneFileError(f"the scene must be at least {SMALLEST_EXTENT:g} across, got {extent:g}")
+    least, most = EXACT_EXTENTS
+    if least <= extent <= most:
+        return scene
+    inexact = (
+        f"the scene is {extent:.2g} units across: indirect light is exact from {least:g} to {most:g}, "
+        "and may be lost beyond; scale the scene"
+    )
+    return replace(scene, warnings=(*scene.warnings, inexact))

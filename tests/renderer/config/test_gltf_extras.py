@@ -148,3 +148,23 @@ def _gltf_triangle(folder):
 def _glb_json(path):
     content = path.read_bytes()
     return json.loads(content[20 : 20 + struct.unpack_from("<I", content, 12)[0]])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('{"asset": {"version": "2.0"}, "x": NaN}', "NaN is not a JSON number"),
+        ('{"asset": {"version": "2.0"}, "x": -Infinity}', "-Infinity is not a JSON number"),
+        ('{"asset": {"version": "2.0"}, "x": 1e999}', "cannot be written again as glTF"),
+        ('{"asset": {}, "buffers": [{"uri": "a%00.bin"}]}', r"uri 'a%00\.bin' names no file"),
+        ('{"asset": {}, "buffers": [{"uri": "\\ud800.bin"}]}', r"uri '\\ud800\.bin' names no file"),
+        ('{"asset": {}, "images": [{"uri": "\\udc80.png"}]}', r"uri '\\udc80\.png' names no file"),
+    ],
+)
+def test_what_is_no_json_or_names_no_file_is_refused(tmp_path, text, message):
+    scene = tmp_path / "scene.gltf"
+    scene.write_text(text)
+    with pytest.raises(InputError, match=message) as refusal:
+        write_gltf_extras(scene, tmp_path / "tuned.gltf", DOCUMENT)
+    assert str(refusal.value).startswith(f"{scene}: ")
+    assert not (tmp_path / "tuned.gltf").exists()

@@ -8,7 +8,7 @@ from built_scenes import colored_room, quad, scene_of
 from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
 from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.placement import default_camera, default_light
+from vpltune.renderer.scene.placement import default_camera, default_light, rasterised_surfaces
 from vpltune.renderer.scene.placement.free_places import is_room
 from vpltune.renderer.scene.placement.free_space import free_space, march_rays, marched, sphere_directions
 from vpltune.renderer.scene.placement.sight import cone_directions, light_hits, lit, lit_fraction, seen_by
@@ -50,6 +50,24 @@ def test_every_voxel_that_a_triangle_crosses_is_occupied():
         assert space.occupied[index].mean() > 0.95
         # A missed voxel touches an occupied one, at worst at an edge.
         assert space.clearance[index].max() < 1.5
+
+
+def test_a_scene_of_more_triangles_than_samples_keeps_its_grid(monkeypatch):
+    """More triangles than the budget has samples for: the grid gets coarser, but not without end.
+
+    A voxel as large as the scene would leave no place for a camera, and put the light far off.
+    """
+    side = 40
+    at = np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2)
+    tiles = [quad([x, 0, z], [0, 0, 1], [1, 0, 0]) for x, z in at]
+    monkeypatch.setattr(rasterised_surfaces, "SAMPLE_BUDGET", 4 * 2 * side**2 - 1)
+    scene = scene_of([*tiles, *box_mesh([10, 1, 10], [20, 9, 20])], [(0.5, 0.5, 0.5)])
+    space = free_space(scene)
+    assert space.voxel_world < side / 8
+    camera, _ = default_camera(scene)
+    light, _ = default_light(scene, camera)
+    for place in (camera.position_world, light.position_world):
+        assert np.linalg.norm(place - 0.5 * side) < 4 * side
 
 
 def test_voxel_areas_add_up_to_the_surface():

@@ -4,6 +4,7 @@ import base64
 import binascii
 import re
 import urllib.parse
+from collections import Counter
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
 from vpltune.renderer.scene.files.gltf_document import GltfDocument
@@ -21,6 +22,7 @@ class GltfBuffers:
         self._document = document
         self._buffers: dict[str, memoryview] = {}
         self._decompressed_views: dict[str, memoryview] = {}
+        self._compressed_bytes: Counter[int] = Counter()
 
     def view(self, holder: JsonObject, key: str = "bufferView") -> tuple[memoryview, int | None]:
         """The bytes of the buffer view to which `key` of `holder` refers, and its byteStride or None.
@@ -46,10 +48,20 @@ class GltfBuffers:
 
     def _decompressed(self, view: JsonObject, compression: JsonObject) -> memoryview:
         if view.where not in self._decompressed_views:
+            self._count_compressed(compression)
             self._decompressed_views[view.where] = decompressed_view(
                 self._slice(compression), view, compression, self._document.decoded
             )
         return self._decompressed_views[view.where]
+
+    def _count_compressed(self, compression: JsonObject) -> None:
+        # Streams take much longer to decode than to name again, so no byte may be in several of them.
+        index = compression.integer("buffer")
+        self._compressed_bytes[index] += len(self._slice(compression))
+        if self._compressed_bytes[index] > len(self._buffer(compression)):
+            raise SceneFileError(
+                f"{compression.where}: must not overlap other compressed views of its buffer"
+            )
 
     def _slice(self, view: JsonObject) -> memoryview:
         start = view.integer("byteOffset", 0)

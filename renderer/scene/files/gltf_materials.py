@@ -179,9 +179,9 @@ class GltfMaterials:
     def _texels_of(self, image: JsonObject) -> UInt8[np.ndarray, "height width 3"]:
         if image.where not in self._texels:
             if "uri" in image.members:
-                content = read_uri(self._document, image)
+                content: bytes | memoryview = read_uri(self._document, image)
             else:
-                content = bytes(self._buffers.view(image)[0])
+                content = self._buffers.view(image)[0]
             source = image.string("uri", "")
             where = image.where if source[:5].lower() in ("", "data:") else f"{image.where} {source!r:.80}"
             self._texels[image.where] = self._decoder.decode(content, where)

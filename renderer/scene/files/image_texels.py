@@ -11,6 +11,7 @@ from PIL import Image
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
 from vpltune.renderer.scene.files.limits import (
     FREE_TEXELS,
+    MAX_IMAGE_BYTES,
     MAX_IMAGE_SIDE,
     MAX_IMAGE_TEXELS,
     MAX_SCENE_TEXELS,
@@ -33,7 +34,7 @@ class ImageDecoder:
         self._texels = 0
         self._bytes = 0
 
-    def decode(self, content: bytes, where: str) -> UInt8[np.ndarray, "height width 3"]:
+    def decode(self, content: bytes | memoryview, where: str) -> UInt8[np.ndarray, "height width 3"]:
         """The texels of an image file, row 0 at the top.
 
         Alpha, colour profiles, gamma and orientation in the file are ignored, as glTF requires.
@@ -41,6 +42,11 @@ class ImageDecoder:
         Raises:
             SceneFileError: the format is unsupported, or the image is broken, cut off or too large.
         """
+        if len(content) > MAX_IMAGE_BYTES:
+            raise SceneFileError(
+                f"{where}: an image file must have at most {MAX_IMAGE_BYTES >> 20} MiB, "
+                f"got {len(content) >> 20} MiB"
+            )
         try:
             # Opening reads the header only, so the size is checked before anything is unpacked.
             with warnings.catch_warnings():

@@ -41,6 +41,9 @@ VERTEX_CHUNK = 1 << 18
 MAX_CHANNELS = 10_000
 """A choice: animation channels, which take about 50 µs each to read."""
 
+MAX_IMAGE_BYTES = 1 << 27
+"""A choice: one image file. It is copied for decoding, beside the file that it is in."""
+
 MAX_IMAGE_SIDE = 16384
 """Side of an image in texels. Every OpenGL 4.3 driver supports at least this (GL_MAX_TEXTURE_SIZE)."""
 

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from vpltune.renderer.errors import InputError
-from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.files import image_texels, read_scene
 
 UV = np.array([[0, 0], [1, 0], [0, 1]], np.float32)
 GREY_RAMP = np.array([[0, 85, 170, 255]], np.uint8)
@@ -229,6 +229,13 @@ def test_like_warnings_are_counted(triangle):
     assert read_scene(triangle.write()).warnings == (
         "2 materials emit light; emission does not light the scene yet",
     )
+
+
+def test_an_image_file_is_limited(triangle, monkeypatch):
+    triangle.add_base_color_image(Image.new("RGB", (2, 2)))
+    monkeypatch.setattr(image_texels, "MAX_IMAGE_BYTES", 10)
+    with pytest.raises(InputError, match=r"images\[0\]: an image file must have at most 0 MiB, got 0 MiB"):
+        read_scene(triangle.write())
 
 
 def test_metals_are_counted(triangle):

@@ -220,3 +220,20 @@ def test_a_triangle_stored_compressed(triangle, change, message):
     compression |= change
     with pytest.raises(InputError, match=message):
         read_scene(triangle.write())
+
+
+def test_one_stream_cannot_be_decoded_again_and_again(triangle):
+    """A view takes 200 bytes to name, and its stream up to a thousand times as long to decode."""
+    stream = encoded_attributes(
+        np.frombuffer(bytes(triangle.blob[:36]), np.uint8).reshape(3, 12), np.random.default_rng(0)
+    )
+    compression = {"buffer": 0, "byteLength": len(stream), "byteStride": 12, "mode": "ATTRIBUTES", "count": 3}
+    view = {"buffer": 1, "byteLength": 36, "extensions": {"EXT_meshopt_compression": compression}}
+    triangle.document["bufferViews"] = [view, view]
+    triangle.document["buffers"] = [{"byteLength": len(stream), "uri": "scene.bin"}, {"byteLength": 36}]
+    triangle.primitive["attributes"]["NORMAL"] = triangle.add(
+        "accessors", {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC3"}
+    )
+    triangle.blob = bytearray(stream)
+    with pytest.raises(InputError, match="EXT_meshopt_compression: must not overlap other compressed views"):
+        read_scene(triangle.write())

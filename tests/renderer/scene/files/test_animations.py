@@ -139,7 +139,7 @@ def test_morph_weights_are_left_out_aloud(triangle):
         ("translation", [0, np.nan], [[0, 0, 0]] * 2, None, "must be finite"),
         ("translation", [0, 1], [[0, 0, 0]] * 3, None, "must have 2 elements for 2 times, got 3"),
         ("translation", [0, 1], [[0, 0, 0]] * 2, "CUBICSPLINE", "must have 6 elements for 2 times"),
-        ("translation", [0, 1], [[0, 0, 1e20]] * 2, None, "must be at most 1e.15 in magnitude"),
+        ("translation", [0, 1], [[0, 0, 1e20]] * 2, None, "must be at most 1e.12 in magnitude"),
         (
             "translation",
             [0, 1],
@@ -179,21 +179,24 @@ def test_a_node_with_a_matrix_is_not_animated(triangle):
 def test_a_motion_out_of_range_is_one_line(triangle):
     """Each scale is in range, but the product is not."""
     triangle.document["nodes"] = [{"children": [1]}, {"mesh": 0}]
-    clip = animate(triangle, "scale", [0, 1], [[1, 1, 1], [1e14, 1, 1]])
-    animate(triangle, "scale", [0, 1], [[1, 1, 1], [1e14, 1, 1]], node=1, clip=clip)
+    clip = animate(triangle, "scale", [0, 1], [[1, 1, 1], [1e11, 1, 1]])
+    animate(triangle, "scale", [0, 1], [[1, 1, 1], [1e11, 1, 1]], node=1, clip=clip)
     scene = read_scene(triangle.write())
-    with pytest.raises(InputError, match="its animation must stay within 1e\\+15, which it leaves at 0.5 s"):
+    with pytest.raises(InputError, match="its animation must stay within 1e\\+12, which it leaves at 0.5 s"):
         placement(scene, 0.5)
 
 
 def test_the_animated_corpus_moves(corpora_folder):
-    """Valid animations of the Khronos asset generator are read without warnings, and most move something."""
+    """Valid animations of the Khronos asset generator are read without warnings, and most move something.
+
+    Their materials leave out metallicFactor, so they are metals.
+    """
     paths = sorted((corpora_folder / "asset_generator" / "Output").glob("Animation_*/*.gltf"))
     assert paths
     still = []
     for path in paths:
         scene = read_scene(path)
-        assert scene.warnings == (), path.name
+        assert [line for line in scene.warnings if "metallic" not in line] == [], path.name
         if scene.animation is None:
             still.append(path.stem)
             continue

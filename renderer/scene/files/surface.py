@@ -69,6 +69,7 @@ def finished_mesh(
         surface, normals = _flat(surface, face_normals)
     else:
         surface = _without_unused_vertices(surface)
+        assert surface.normals is not None
         unit, has_normal = unit_rows(surface.normals.astype(np.float64))
         lacking = ~has_normal[surface.triangles]
         decoded.spend(per_vertex * (len(unit) + int(lacking.sum())), where)

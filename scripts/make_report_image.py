@@ -14,7 +14,7 @@ from typing import Literal
 from PIL import Image
 from playwright.sync_api import Browser, ViewportSize, sync_playwright
 
-from vpltune.__main__ import run
+from vpltune.cli.program import run
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 SCENES = REPOSITORY / "configs" / "scenes"

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from vpltune.renderer.errors import InputError
+from vpltune.renderer.files import unfinished_files
 
 
 @contextlib.contextmanager
@@ -29,6 +30,7 @@ def written_whole(path: Path) -> Iterator[Path]:
         raise InputError(f"{path}: cannot be written ({error.strerror})") from error
     os.close(handle)
     temporary = Path(name)
+    unfinished_files.begun(temporary)
     try:
         yield temporary
         with temporary.open("rb") as written:
@@ -37,6 +39,7 @@ def written_whole(path: Path) -> Iterator[Path]:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+        unfinished_files.ended(temporary)
 
 
 def write_text_whole(path: Path, text: str) -> None:

@@ -9,7 +9,7 @@ import benchmarks
 import benchmarks.harness.machine
 from benchmarks.harness.registry import benchmark_names
 from benchmarks.harness.row import Row
-from vpltune.__main__ import run
+from vpltune.cli.program import run
 
 
 def test_a_row_has_the_ratio():

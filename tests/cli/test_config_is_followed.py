@@ -13,7 +13,7 @@ from config_documents import OLDER_QUALITY
 import vpltune.tuner.batch.batch
 import vpltune.tuner.scene_fit.evaluate_scene
 import vpltune.tuner.scene_fit.fit_scene
-from vpltune.__main__ import run
+from vpltune.cli.program import run
 from vpltune.cli.quality_flags import with_flags
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.gltf_extras import EXTRAS_KEY, read_gltf_extras, write_gltf_extras

@@ -7,7 +7,7 @@ import pytest
 
 import vpltune.tuner.doctor.machine_findings
 import vpltune.tuner.doctor.machine_probes
-from vpltune.__main__ import run
+from vpltune.cli.program import run
 from vpltune.tuner.doctor.machine_findings import PROBES, Finding, Probe, run_probe
 from vpltune.tuner.doctor.machine_probes import PROBE_FUNCTIONS
 

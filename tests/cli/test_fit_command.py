@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from vpltune.__main__ import run
+from vpltune.cli.program import run
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import FitNote, TunedConfig, read_config, write_config

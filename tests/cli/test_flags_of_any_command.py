@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-import vpltune.__main__ as program
+import vpltune.cli.program as program
 import vpltune.renderer.config.tuned_config
-from vpltune.__main__ import COMMANDS, run
 from vpltune.cli.batch_display import SilentDisplay, shown_batch
+from vpltune.cli.program import COMMANDS, run
 from vpltune.cli.progress_display import shown_progress
 from vpltune.cli.report import warn
 from vpltune.cli.verbosity import choose_verbosity, reset_verbosity
@@ -198,7 +198,7 @@ def test_benchmarks_are_offered_in_a_checkout_only(tmp_path):
     for name in ("cli", "renderer", "tuner"):
         (tmp_path / "vpltune").mkdir(exist_ok=True)
         (tmp_path / "vpltune" / name).symlink_to((REPOSITORY / "vpltune" / name).resolve())
-    for name in ("__init__.py", "__main__.py"):
+    for name in ("__init__.py", "__main__.py", "guard.py"):
         (tmp_path / "vpltune" / name).write_bytes((REPOSITORY / "vpltune" / name).read_bytes())
 
     def shown(*arguments):

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 from steady_clock import steady_clock
 
-from vpltune.__main__ import run
+from vpltune.cli.program import run
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, read_config, write_config

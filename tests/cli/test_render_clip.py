@@ -12,8 +12,8 @@ from PIL import Image
 
 import vpltune.renderer.files.video_file
 import vpltune.renderer.scene.sequence
-from vpltune.__main__ import run
 from vpltune.cli.options import Motion
+from vpltune.cli.program import run
 from vpltune.renderer.frame.runtime import Runtime
 
 # The encoder is started by fork and exec, of which JAX warns once an earlier test has loaded it; the command

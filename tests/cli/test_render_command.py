@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from vpltune.__main__ import run
 from vpltune.cli.options import (
     InterleaveOption,
     Layer,
@@ -17,6 +16,7 @@ from vpltune.cli.options import (
     MapSizeOption,
     RsmResolutionOption,
 )
+from vpltune.cli.program import run
 from vpltune.renderer.config.quality import (
     INTERLEAVES,
     LARGEST_MAP,

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import typer
 
-from vpltune.__main__ import app
+from vpltune.cli.program import app
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PAGES = sorted((REPOSITORY / "docs").rglob("*.md"))

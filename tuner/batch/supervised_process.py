@@ -18,6 +18,7 @@ from typing import Any
 import psutil
 
 from vpltune.renderer.errors import MachineError
+from vpltune.renderer.files.unfinished_files import inherited_pipe
 from vpltune.tuner.batch.job import Job
 from vpltune.tuner.batch.messages import receive, send
 from vpltune.tuner.batch.record import Record
@@ -144,7 +145,7 @@ class SupervisedProcess:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=self._words,
-                pass_fds=(theirs.fileno(),),
+                pass_fds=(theirs.fileno(), *inherited_pipe()),
                 env={**os.environ, **thread_settings(self._threads)},
                 start_new_session=True,  # own process group: killed as a whole, not reached by Ctrl-C
             )

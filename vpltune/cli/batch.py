@@ -23,6 +23,7 @@ from vpltune.cli.options import (
     parse_size,
 )
 from vpltune.cli.report import OK, PARTLY_DONE, Report, warn
+from vpltune.guard import asked_to_stop
 from vpltune.renderer.errors import InputError
 
 if TYPE_CHECKING:
@@ -136,7 +137,7 @@ def batch(
     count = workers or (SLURM_TASKS if slurm is not None else _workers_that_fit(threads))
     limits = _limits(time_limit, memory_limit, retries, None if elsewhere else count)
     tasks = None if slurm is None else parse_slurm(slurm)
-    with shown_batch(count) as watcher:
+    with asked_to_stop(), shown_batch(count) as watcher:
         result = run_batch(
             library,
             output,

@@ -6,6 +6,7 @@ import typer
 
 from vpltune.cli.options import JsonOption
 from vpltune.cli.report import INTERRUPTED, OK, Report, warn
+from vpltune.guard import asked_to_stop
 from vpltune.renderer.errors import InputError
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def bench(
     if name != "all" and name not in known:
         raise InputError(f"bench: NAME must be one of {', '.join([*known, 'all'])}, got {name!r:.60}")
     rows, exit_code = [], OK
-    with shown_progress() as progress:
+    with asked_to_stop(), shown_progress() as progress:
         try:
             for chosen in known if name == "all" else (name,):
                 for row in run_benchmark(chosen, progress):

@@ -12,7 +12,7 @@ from exported_frames import CONFIG, READER, SCENES, textured_room, with_paramete
 from PIL import Image
 
 from vpltune import Runtime
-from vpltune.__main__ import run
+from vpltune.cli.program import run
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, parse_config

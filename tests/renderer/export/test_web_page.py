@@ -15,7 +15,7 @@ from headless_chromium import headless_chromium
 from PIL import Image
 
 from vpltune import Runtime
-from vpltune.__main__ import run
+from vpltune.cli.program import run
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import FitNote
 from vpltune.renderer.errors import InputError

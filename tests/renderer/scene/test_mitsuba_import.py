@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from vpltune import Runtime
-from vpltune.__main__ import run
+from vpltune.cli.program import run
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig

@@ -14,7 +14,7 @@ import psutil
 import pytest
 from quick_fit import QUICK_FIT
 
-from vpltune.__main__ import run
+from vpltune.cli.program import run
 from vpltune.renderer.config.tuned_config import TunedConfig, write_config
 from vpltune.tuner.batch.record import Records
 

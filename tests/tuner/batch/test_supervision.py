@@ -13,7 +13,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from vpltune.__main__ import run
+from vpltune.cli.program import run
 from vpltune.renderer.errors import MachineError
 from vpltune.tuner.batch.attempts import tune_with_retries
 from vpltune.tuner.batch.local_scheduler import tune_locally

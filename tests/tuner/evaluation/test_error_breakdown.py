@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from vpltune import configs
-from vpltune.__main__ import run
 from vpltune.cli.metrics_table import error_breakdown_table
+from vpltune.cli.program import run
 
 CORNELL = Path(configs.__file__).parent / "scenes" / "cornell-box.glb"
 

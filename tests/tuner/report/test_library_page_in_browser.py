@@ -9,7 +9,7 @@ import pytest
 from opened_page import opened
 from planted_metrics import change_metrics
 
-from vpltune.__main__ import run
+from vpltune.cli.program import run
 from vpltune.tuner.batch.record import Record, Records
 from vpltune.tuner.evaluation.view_images import VARIANTS
 from vpltune.tuner.report.batch_folder import BatchFolder, read_batch_folder

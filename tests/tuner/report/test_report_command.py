@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from planted_metrics import PLANTED, change_metrics
 
-from vpltune.__main__ import run
+from vpltune.cli.program import run
 from vpltune.renderer.errors import InputError
 from vpltune.tuner.evaluation.view_images import MAXIMUM_PIXELS
 from vpltune.tuner.report.fit_folder import read_fit_folder

@@ -7,7 +7,7 @@ import pytest
 from opened_page import opened
 from planted_metrics import PLANTED, change_metrics
 
-from vpltune.__main__ import run
+from vpltune.cli.program import run
 from vpltune.tuner.evaluation.view_images import VARIANTS, read_view_images
 from vpltune.tuner.metrics.tone_curve import display_image
 from vpltune.tuner.report.fit_folder import read_fit_folder

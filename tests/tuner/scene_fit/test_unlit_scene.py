@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from vpltune.__main__ import run
+from vpltune.cli.program import run
 
 # A single plate: whatever light it sends, nothing is there to receive it.
 PLATE = "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nf 4 3 2 1\n"

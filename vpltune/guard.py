@@ -196,9 +196,13 @@ class _Guard:
             self._spoken |= word == _SPEAKS
 
     def _remove_unfinished(self) -> None:
-        for path in self._unfinished:
-            with contextlib.suppress(OSError):
-                Path(os.fsdecode(path)).unlink()
+        for each in self._unfinished:
+            path = Path(os.fsdecode(each))
+            if path.is_dir():
+                import shutil
+
+                shutil.rmtree(path, ignore_errors=True)
+            path.unlink(missing_ok=True)
 
     def _say(self, line: str) -> None:
         if sys.stderr is None:

@@ -1,13 +1,20 @@
-"""Atomic writes: a file is written completely or not at all."""
+"""Atomic writes: a file, or a set of files, is written completely or not at all."""
 
 import contextlib
+import errno
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from vpltune.renderer.errors import InputError
+from vpltune.renderer.errors import InputError, MachineError
 from vpltune.renderer.files import unfinished_files
+
+TRIAL_BYTES = 1 << 16
+"""Bytes that `require_writable` tries to write. A choice: more than any file system keeps within an inode."""
+_READABLE_BY_ALL = 0o644
+"""mkstemp makes files that only their owner may read."""
 
 
 @contextlib.contextmanager
@@ -18,25 +25,25 @@ def written_whole(path: Path) -> Iterator[Path]:
     interrupt, it is removed and `path` stays as it was.
 
     Raises:
-        InputError: the folder cannot be created or written to, or `path` is itself a folder.
+        InputError: the folder cannot be created, or `path` is itself a folder.
+        MachineError: the disk is full or read-only, or nothing was written.
     """
     path = Path(path)
     if path.is_dir():
         raise InputError(f"{path}: cannot be written (it is a folder)")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror})") from error
-    os.close(handle)
-    temporary = Path(name)
-    unfinished_files.begun(temporary)
+    temporary = _temporary(path)
     try:
         yield temporary
         with temporary.open("rb") as written:
             os.fsync(written.fileno())
-        temporary.chmod(0o644)
+        if not temporary.stat().st_size:
+            raise MachineError(f"{path}: cannot be written (the file stayed empty; is the disk full?)")
+        temporary.chmod(_READABLE_BY_ALL)
         temporary.replace(path)
+    except OSError as error:
+        if error.errno not in _DISK and error.filename != str(temporary):
+            raise
+        raise MachineError(f"{path}: cannot be written ({error.strerror})") from error
     finally:
         temporary.unlink(missing_ok=True)
         unfinished_files.ended(temporary)
@@ -46,7 +53,71 @@ def write_text_whole(path: Path, text: str) -> None:
     """Write `text` to `path` as UTF-8, atomically.
 
     Raises:
-        InputError: the folder cannot be created or written to, or `path` is itself a folder.
+        InputError, MachineError: as `written_whole`.
     """
     with written_whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+@contextlib.contextmanager
+def written_together(folder: Path) -> Iterator[Path]:
+    """Yield an empty folder in `folder`; on success, move all files in it to `folder`.
+
+    So a set of files changes whole: what can fail, fails before the first one is replaced.
+
+    Raises:
+        InputError, MachineError: as `written_whole`.
+    """
+    require_writable(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    staging = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
+    unfinished_files.begun(staging)
+    try:
+        yield staging
+        for path in sorted(staging.iterdir()):
+            path.replace(folder / path.name)
+    except MachineError as error:
+        raise MachineError(str(error).replace(str(staging), str(folder))) from error
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+        unfinished_files.ended(staging)
+
+
+def require_writable(folder: Path) -> None:
+    """Check that files can be written in `folder`, or where it would be created. Call it before long work.
+
+    Raises:
+        InputError: the folder, or what it would be created in, is a file.
+        MachineError: it cannot be written to, or the disk is full.
+    """
+    there = next(each for each in (folder, *folder.absolute().parents) if each.exists())
+    if not there.is_dir():
+        raise InputError(f"{there}: must be a folder, got a file")
+    trial = _temporary(there / "trial")
+    try:
+        with trial.open("wb") as file:
+            file.write(bytes(TRIAL_BYTES))
+            os.fsync(file.fileno())
+    except OSError as error:
+        raise MachineError(f"{folder}: cannot be written to ({error.strerror})") from error
+    finally:
+        trial.unlink(missing_ok=True)
+        unfinished_files.ended(trial)
+
+
+_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
+"""What a disk answers that cannot take a file; other errors within `written_whole` may be of other files."""
+
+
+def _temporary(path: Path) -> Path:
+    """A new, empty file beside `path`, in a folder that is created."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+    except OSError as error:
+        line = f"{path}: cannot be written ({error.strerror})"
+        lacks = error.errno in (*_DISK, errno.EACCES, errno.EPERM)
+        raise (MachineError if lacks else InputError)(line) from error
+    os.close(handle)
+    unfinished_files.begun(Path(name))
+    return Path(name)

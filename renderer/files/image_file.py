@@ -8,7 +8,7 @@ import OpenEXR
 from jaxtyping import Float, Float32, UInt8
 from PIL import Image
 
-from vpltune.renderer.errors import InputError
+from vpltune.renderer.errors import InputError, MachineError
 from vpltune.renderer.files.atomic_file import written_whole
 
 
@@ -53,13 +53,17 @@ def write_exr(
     OpenEXR recommends the names Z for depth and Y for luminance. NaN and infinity are kept.
 
     Raises:
-        InputError: the name does not end in .exr, or the path cannot be written to.
+        InputError: the name does not end in .exr, or the path is a folder.
+        MachineError: the path cannot be written to.
     """
     require_extension(path, ".exr")
     channels = {"RGB" if pixels.ndim == 3 else channel: np.ascontiguousarray(pixels)}
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     with written_whole(Path(path)) as temporary, OpenEXR.File(header, channels) as file:
-        file.write(str(temporary))
+        try:
+            file.write(str(temporary))
+        except RuntimeError as error:
+            raise MachineError(f"{path}: cannot be written ({str(error).splitlines()[-1]})") from error
 
 
 def read_exr(

@@ -1,6 +1,7 @@
 """Video files: an H.264 .mp4, or a folder of numbered .png files."""
 
 import contextlib
+import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -12,8 +13,8 @@ from vpltune.renderer.errors import InputError, MachineError
 from vpltune.renderer.files.atomic_file import written_whole
 from vpltune.renderer.files.image_file import write_png
 
-QUALITY = 8
-"""A choice: quality on imageio-ffmpeg's scale of 0 to 10, with hardly any visible loss."""
+RATE_FACTOR = 10
+"""x264's constant rate factor (0 lossless, 51 worst). A choice: hardly any visible loss."""
 
 Image = UInt8[np.ndarray, "height width 3"]
 
@@ -53,7 +54,7 @@ def clip_writer(path: Path, size: tuple[int, int], fps: float) -> Iterator[Calla
     """
     check_clip_path(path, size)
     if path.suffix.lower() == ".mp4":
-        with written_whole(path) as temporary, _encoder(temporary, size, fps) as write:
+        with written_whole(path) as temporary, _encoder(temporary, path, size, fps) as write:
             yield write
         return
     count = 0
@@ -67,29 +68,43 @@ def clip_writer(path: Path, size: tuple[int, int], fps: float) -> Iterator[Calla
 
 
 @contextlib.contextmanager
-def _encoder(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Image], None]]:
-    encoder = imageio_ffmpeg.write_frames(
-        str(path),
-        size,
-        fps=fps,  # pyright: ignore[reportArgumentType]  (its type is read off a whole default)
-        codec="libx264",
-        quality=QUALITY,
-        # The default of 16 would resize the image unless 16 divides both sides. They are even, so 2 does.
-        macro_block_size=2,
-        output_params=["-movflags", "+faststart"],
-        ffmpeg_log_level="error",
-    )
-    encoder.send(None)
+def _encoder(
+    temporary: Path, path: Path, size: tuple[int, int], fps: float
+) -> Iterator[Callable[[Image], None]]:
+    width, height = size
+    command = [
+        *(imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error", "-nostdin"),
+        *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{fps:g}", "-i", "-"),
+        *("-c:v", "libx264", "-crf", str(RATE_FACTOR), "-pix_fmt", "yuv420p", "-movflags", "+faststart"),
+        str(temporary),
+    ]
+    encoder = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert encoder.stdin is not None
+    assert encoder.stderr is not None
+    frames, said = encoder.stdin, encoder.stderr
 
     def write(image: Image) -> None:
-        try:
-            encoder.send(np.ascontiguousarray(image))
-        except OSError as error:
-            raise MachineError(
-                f"{path.name}: the video encoder failed ({str(error).splitlines()[0]})"
-            ) from error
+        # A dead encoder closes its end; its exit code and its last words say why.
+        with contextlib.suppress(BrokenPipeError):
+            frames.write(np.ascontiguousarray(image).tobytes())
+            return
+        end()
+
+    def end() -> None:
+        with contextlib.suppress(BrokenPipeError):
+            frames.close()
+        words = said.read().decode("utf-8", "replace").strip().splitlines()
+        if encoder.wait() or words:
+            # "[out#0/mp4 @ 0x…] No space left": where in ffmpeg is of no use to anybody.
+            reason = words[0].rpartition("] ")[2] if words else f"exit code {encoder.returncode}"
+            raise MachineError(f"{path}: the video encoder failed ({reason})")
 
     try:
         yield write
+        end()
     finally:
-        encoder.close()
+        encoder.kill()
+        encoder.wait()
+        said.close()
+        with contextlib.suppress(BrokenPipeError):
+            frames.close()

@@ -1,5 +1,6 @@
 """`vpltune fit` and `evaluate`, whole: what other programs are promised is in the files and on stdout."""
 
+import hashlib
 import json
 import math
 from dataclasses import replace
@@ -70,7 +71,8 @@ def test_stdout_and_metrics_are_as_documented(fitted, document):
 def test_metrics_say_how_they_came_about(fitted, document):
     provenance = document["provenance"]
     assert provenance["command"] == " ".join(["vpltune", *command(fitted, "out"), "--json"])
-    assert len(provenance["scene_sha256"]) == 64
+    assert provenance["scene_file_sha256"] == hashlib.sha256(SCENE.read_bytes()).hexdigest()
+    assert len(provenance["scene_content_sha256"]) == 64
     assert {"vpltune", "mitsuba", "jax", "python", "platform", "opengl", "seed"} <= set(provenance)
     loss = document["loss"]
     assert loss["curve"][0] == loss["start"]

@@ -6,7 +6,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from vpltune.renderer.errors import InputError
-from vpltune.renderer.files.atomic_file import write_text_whole
+from vpltune.renderer.files.atomic_file import require_writable, write_text_whole
 from vpltune.tuner.batch.record import Record
 from vpltune.tuner.report.batch_folder import BatchFolder, is_batch_folder, read_batch_folder
 from vpltune.tuner.report.fit_folder import METRICS, is_fit_folder, read_fit_folder
@@ -43,6 +43,8 @@ def write_report(folder: Path, progress: Callable[[float], None] = lambda share:
     Raises:
         InputError: the folder is neither, or a file of the fit or the batch's listing cannot be read.
     """
+    if folder.is_dir():
+        require_writable(folder)
     if is_batch_folder(folder):
         return _write_library(read_batch_folder(folder), progress)
     if not is_fit_folder(folder):

@@ -1,5 +1,6 @@
 """`vpltune fit`: fits a scene, judges the result on validation views, and writes config and metrics."""
 
+import hashlib
 import importlib.metadata
 import platform
 from dataclasses import asdict, dataclass, field, replace
@@ -10,8 +11,7 @@ import numpy as np
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, placement
 from vpltune.renderer.config.tuned_config import FitNote, TunedConfig, read_config, write_config
-from vpltune.renderer.errors import InputError
-from vpltune.renderer.files.atomic_file import write_text_whole
+from vpltune.renderer.files.atomic_file import require_writable, write_text_whole, written_together
 from vpltune.renderer.files.strict_json import strict_json
 from vpltune.renderer.scene.views import write_views
 from vpltune.tuner.evaluation.comparison_image import write_comparison
@@ -118,8 +118,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
         MachineError: there is no OpenGL 4.5, or the GPU ran out of memory.
     """
     watch = Stopwatch()
-    if output.exists() and not output.is_dir():
-        raise InputError(f"{output}: the output must be a folder, got a file")
+    require_writable(output)
     prepared = prepare_scene(scene_path, options, options.start, watch, progress, validated=True)
     fitted = [view for view in prepared.views if view.view.split == "fitted"]
     drawn = [view.drawn_with.parameters for view in fitted if view.drawn_with is not None]
@@ -136,12 +135,8 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
             breakdown["error_breakdown"] = error_breakdown(
                 prepared, evaluation, options, lambda share: progress("split error", share)
             )
-    config = _config(prepared, found, options)
+    config = _config(prepared, found, options, scene_path)
     views = (*(view.view for view in prepared.views), *(view for view, _ in prepared.validation))
-    write_views(output / "views.json", str(scene_path), views)
-    write_comparison(output / "comparison.png", prepared.runtime, evaluation.most_and_least_gained())
-    write_view_images(output / "images.npz", evaluation.views)
-    write_config(output / "tuned.json", config)
     notes = (*prepared.notes, *evaluation.notes(), *found.notes)
     descent = found.descent
     document = {
@@ -175,7 +170,12 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
             "command": options.command,
         },
     }
-    write_text_whole(output / "metrics.json", strict_json(document) + "\n")
+    with written_together(output) as folder:
+        write_views(folder / "views.json", str(scene_path), views)
+        write_comparison(folder / "comparison.png", prepared.runtime, evaluation.most_and_least_gained())
+        write_view_images(folder / "images.npz", evaluation.views)
+        write_config(folder / "tuned.json", config)
+        write_text_whole(folder / "metrics.json", strict_json(document) + "\n")
     return FitResult(config, found.status, descent, evaluation, notes, document)
 
 
@@ -348,10 +348,13 @@ def _keeps_prior(found: _Found, options: FitOptions) -> bool:
     return kept and options.start.auto is not None and options.budget is None
 
 
-def _config(prepared: PreparedScene, found: _Found, options: FitOptions) -> TunedConfig:
+def _config(
+    prepared: PreparedScene, found: _Found, options: FitOptions, scene_path: Path
+) -> TunedConfig:
     provenance: dict[str, str | int | float] = {
         "scene": prepared.scene.name,
-        "scene_sha256": scene_digest(prepared.scene),
+        "scene_file_sha256": hashlib.sha256(scene_path.read_bytes()).hexdigest(),
+        "scene_content_sha256": scene_digest(prepared.scene),
         "vpltune": importlib.metadata.version("vpltune"),
         "mitsuba": importlib.metadata.version("mitsuba"),
         "jax": importlib.metadata.version("jax"),

@@ -119,6 +119,7 @@ def batch(
     from vpltune.cli.command_line import command_line
     from vpltune.cli.quality_flags import with_flags
     from vpltune.renderer.config.tuned_config import config_text, read_config
+    from vpltune.renderer.files.atomic_file import require_writable
     from vpltune.tuner.batch.batch import run_batch
     from vpltune.tuner.batch.job import JobOptions
 
@@ -137,6 +138,7 @@ def batch(
     count = workers or (SLURM_TASKS if slurm is not None else _workers_that_fit(threads))
     limits = _limits(time_limit, memory_limit, retries, None if elsewhere else count)
     tasks = None if slurm is None else parse_slurm(slurm)
+    require_writable(output)
     with asked_to_stop(), shown_batch(count) as watcher:
         result = run_batch(
             library,

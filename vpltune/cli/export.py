@@ -71,6 +71,7 @@ def export(
 
     from vpltune.cli.quality_flags import with_flags
     from vpltune.renderer.config.tuned_config import read_config
+    from vpltune.renderer.files.atomic_file import require_writable
 
     if to in WITH_SCENE and scene is None:
         raise InputError(f"--scene: must be given with --to {to}")
@@ -84,6 +85,7 @@ def export(
         raise InputError(f"{output}: the file name must end in .html, got {output.suffix or 'no suffix'!r}")
     if renew_checksum and to not in WITH_CHECKSUM:
         raise InputError(f"--renew-checksum: needs --to {' or '.join(WITH_CHECKSUM)}, got --to {to}")
+    require_writable(output if to == "bundle" else output.parent)
     config, overridden = with_flags(read_config(file, check=not renew_checksum), visibility=visibility)
     warn(overridden)
     fit = fit_outcome(config)

@@ -26,8 +26,10 @@ def import_scene(
         raise InputError(f"{output}: the file name must end in .glb, got {output.suffix or 'no suffix'!r}")
 
     from vpltune.renderer.export.glb_writer import write_glb
+    from vpltune.renderer.files.atomic_file import require_writable
     from vpltune.renderer.scene.mitsuba_import import read_mitsuba
 
+    require_writable(output.parent)
     loaded = read_mitsuba(scene)
     warn(loaded.warnings)
     write_glb(output, loaded, notes=loaded.warnings)

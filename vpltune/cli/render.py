@@ -86,6 +86,7 @@ def render(
     from vpltune.cli.quality_flags import with_flags
     from vpltune.cli.render_clip import write_clip
     from vpltune.renderer.config.tuned_config import read_config
+    from vpltune.renderer.files.atomic_file import require_writable
     from vpltune.renderer.files.image_file import require_extension
     from vpltune.renderer.files.video_file import check_clip_path
 
@@ -95,6 +96,7 @@ def render(
         require_extension(output, ".png", ".exr")
     else:
         check_clip_path(output, chosen.size)
+    require_writable(output if frames is not None and not output.suffix else output.parent)
     if not (math.isfinite(fps) and 0.1 <= fps <= 1000.0):
         raise InputError(f"--fps: must lie in [0.1, 1000], got {fps}")
     factor = checked_scale(scale)

@@ -31,8 +31,10 @@ def train_prior(
     from rich.markup import escape
 
     from vpltune.cli.progress_display import shown_progress
+    from vpltune.renderer.files.atomic_file import require_writable
     from vpltune.tuner.prior.train_prior import train_prior as train
 
+    require_writable(output.parent)
     with shown_progress() as progress:
         document = train(library, generated, seed, output, command_line(), progress)
     shown = (f"wrote {escape(document['output'])}", f"card:  {escape(document['card'])}")

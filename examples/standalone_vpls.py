@@ -142,8 +142,11 @@ def relaxed(vpls, samples, length, reach, off_plane_factor, sample_reach):
     for number in np.unique(owner):
         own = samples[owner == number]
         middle, facing = own[:, :3].mean(0), own[:, 4:7].sum(0)
-        # The radius of a disc with the cluster's spread. A sample's own disc adds half its radius squared.
-        radius = np.sqrt(2 * ((own[:, :3] - middle) ** 2).sum(1).mean() + (own[:, 3] ** 2).mean())
+        # The radius of a disc with the cluster's spread. The samples' own discs add to it; where several
+        # lights shine on one place, they overlap and are too large.
+        between, within = ((own[:, :3] - middle) ** 2).sum(1).mean(), (own[:, 3] ** 2).mean() / 2
+        spread = between + (min(within, 2 * between / len(own)) if len(own) > 1 else within)
+        radius = np.sqrt(2 * spread)
         facing = facing / max(np.linalg.norm(facing), 1e-30)
         near = own[far(own, unit[owner == number], middle[None], facing[None]).argmin()]
         # Slide along the nearest sample's plane towards the centroid, but stay within that sample's disc: the

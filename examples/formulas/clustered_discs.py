@@ -62,7 +62,9 @@ def _cluster(samples: Vpls, own: np.ndarray, scene_length: float):
     slide = middle - position[nearest]
     slide = slide - normal[nearest] * dot(normal[nearest], slide)
     slide = slide * min(1.0, footprint[nearest] / max(float(length(slide)), 1e-30))
-    # Mean squared distance from the middle; a sample's own disc adds half its radius squared.
-    offset = position - middle
-    spread = max(float((dot(offset, offset) + 0.5 * footprint**2).mean()), 0.0)
+    # Mean squared distance of the light from the middle: between the samples, and within their own discs.
+    # These overlap, and are too large, where several lights shine on one place.
+    between = float(dot(position - middle, position - middle).mean())
+    within = float((0.5 * footprint**2).mean())
+    spread = between + (min(within, 2.0 * between / own.sum()) if own.sum() > 1 else within)
     return position[nearest] + slide, normal[nearest], np.sqrt(2.0 * spread), samples.flux[own].sum(axis=0)

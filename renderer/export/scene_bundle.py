@@ -23,7 +23,7 @@ from vpltune.renderer.frame.rsm_resolution import rsm_resolution
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
 from vpltune.renderer.frame.visibility_map_layout import VisibilityMapLayout
 from vpltune.renderer.gpu.camera_uniforms import camera_uniforms
-from vpltune.renderer.gpu.render_targets import MAX_ATLAS_COLUMNS
+from vpltune.renderer.gpu.render_targets import atlas_columns
 from vpltune.renderer.scene.animation import AnimationPlayer
 from vpltune.renderer.scene.light_faces import LightRecords, face_count, light_records
 from vpltune.renderer.scene.placed_boxes import placed_boxes
@@ -246,7 +246,7 @@ def _texture(texture: Texture, binary: _Binary) -> dict[str, Any]:
 
 def _atlas(records: LightRecords) -> tuple[int, int]:
     """Columns and rows of tiles."""
-    columns = max(1, min(len(records.faces), MAX_ATLAS_COLUMNS))
+    columns = atlas_columns(len(records.faces))
     return columns, max(1, -(-len(records.faces) // columns))
 
 

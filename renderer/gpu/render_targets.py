@@ -1,10 +1,12 @@
 """The textures that passes hand to each other."""
 
+import math
 from dataclasses import dataclass
 
 import moderngl
 import numpy as np
 
+from vpltune.renderer.errors import MachineError
 from vpltune.renderer.gpu.gpu_context import check_errors, create_depth_texture
 
 
@@ -72,11 +74,17 @@ def create_gbuffer(context: moderngl.Context, size: tuple[int, int]) -> GBuffer:
     return GBuffer(depth, normal, albedo, framebuffer)
 
 
-MAX_ATLAS_COLUMNS = 6
-"""Tiles side by side: the six faces of a point light make one row."""
+_FACES_OF_A_POINT = 6
+"""The faces of a point light make one row, or a part of one."""
 GBUFFER_READS = ("gbuffer_depth", "gbuffer_normal")
 RSM_READS = ("rsm_depth", "rsm_normal", "rsm_reflectance", "lights", "rsm_faces")
 """What a program declares that includes `common/gbuffer.glsl` or `common/rsm.glsl`."""
+
+
+def atlas_columns(face_count: int) -> int:
+    """Tiles side by side: about as many as there are one above another."""
+    about = _FACES_OF_A_POINT * math.ceil(math.sqrt(face_count) / _FACES_OF_A_POINT)
+    return max(1, min(face_count, about))
 
 
 def create_reflective_shadow_map(
@@ -87,9 +95,15 @@ def create_reflective_shadow_map(
     Raises:
         MachineError: the GPU cannot hold it.
     """
-    columns = max(1, min(face_count, MAX_ATLAS_COLUMNS))
+    columns = atlas_columns(face_count)
     rows = max(1, -(-face_count // columns))
     size = (columns * resolution, rows * resolution)
+    largest = context.info["GL_MAX_TEXTURE_SIZE"]
+    if max(size) > largest:
+        raise MachineError(
+            f"lights: their {face_count} shadow maps of {resolution}² texels are more than a texture of this "
+            f"GPU holds ({largest}²); use fewer lights, or a smaller --rsm-resolution"
+        )
     depth = create_depth_texture(context, size)
     normal = _nearest(context.texture(size, 2, dtype="nu2"))
     reflectance = _nearest(context.texture(size, 4, dtype="f2"))

@@ -34,8 +34,8 @@ float cluster_length(float scene_length, VirtualPointLight one) {
 // sums lose few digits.
 struct ClusterSums {
     vec4 offset_count;   // Σ offset [world units]; number of samples
-    vec4 normal_square;  // Σ unit normal; Σ (|offset|² + l²/2) [world units²], l²/2 being the spread of a sample's disc
-    vec4 flux;           // Σ flux [W]
+    vec4 normal_square;  // Σ unit normal; Σ |offset|² [world units²]
+    vec4 flux_square;    // Σ flux [W]; Σ l²/2 [world units²], the spread of the samples' own discs
 };
 
 // An empty cluster: the neutral element of `joined`.
@@ -43,15 +43,17 @@ const ClusterSums NO_SAMPLES = ClusterSums(vec4(0.0), vec4(0.0), vec4(0.0));
 
 ClusterSums joined(ClusterSums one, ClusterSums other) {
     return ClusterSums(
-        one.offset_count + other.offset_count, one.normal_square + other.normal_square, one.flux + other.flux);
+        one.offset_count + other.offset_count, one.normal_square + other.normal_square,
+        one.flux_square + other.flux_square);
 }
 
 // `sums` with one more sample; `before` is the VPL's previous position.
 ClusterSums with_sample(ClusterSums sums, VirtualPointLight one, vec3 before) {
     vec3 offset = one.position_footprint.xyz - before;
     float footprint = one.position_footprint.w;
-    float square = dot(offset, offset) + 0.5 * footprint * footprint;
-    return joined(sums, ClusterSums(vec4(offset, 1.0), vec4(one.normal_area.xyz, square), one.flux));
+    return joined(sums, ClusterSums(
+        vec4(offset, 1.0), vec4(one.normal_area.xyz, dot(offset, offset)),
+        vec4(one.flux.rgb, 0.5 * footprint * footprint)));
 }
 
 // The cluster's centroid, relative to the VPL's previous position.
@@ -65,6 +67,17 @@ vec3 cluster_normal(ClusterSums sums) {
     return sums.normal_square.xyz / max(length(sums.normal_square.xyz), 1e-30);
 }
 
+// Mean squared distance of a cluster's light from its centroid: that of its samples, and that within their own discs. Each
+// disc has 1/n of the area, and so adds 1/n to the spread. Where several lights shine on one place, the discs of their
+// samples overlap and are too large; twice that share is the most that counts.
+float cluster_spread(ClusterSums sums) {
+    float count = sums.offset_count.w;
+    vec3 offset = cluster_offset(sums);
+    float between = max(sums.normal_square.w / count - dot(offset, offset), 0.0);
+    float within = sums.flux_square.w / count;
+    return between + (count > 1.0 ? min(within, 2.0 * between / count) : within);
+}
+
 // The clustered disc light: it has the flux of its samples and the radius of their spread. It lies on the surface of
 // `one`, the sample nearest to the centroid.
 VirtualPointLight clustered_disc(ClusterSums sums, vec3 before, VirtualPointLight one) {
@@ -74,10 +87,9 @@ VirtualPointLight clustered_disc(ClusterSums sums, vec3 before, VirtualPointLigh
     vec3 slide = before + offset - one.position_footprint.xyz;
     slide -= one.normal_area.xyz * dot(one.normal_area.xyz, slide);
     slide *= min(1.0, one.position_footprint.w / max(length(slide), 1e-30));
-    // The mean squared distance from the centroid; that of an even disc is half its radius squared.
-    float spread = max(sums.normal_square.w / sums.offset_count.w - dot(offset, offset), 0.0);
+    float spread = cluster_spread(sums);  // that of an even disc is half its radius squared
     return VirtualPointLight(
         vec4(one.position_footprint.xyz + slide, sqrt(2.0 * spread)),
         vec4(one.normal_area.xyz, 2.0 * PI * spread),
-        sums.flux);
+        vec4(sums.flux_square.rgb, 0.0));
 }

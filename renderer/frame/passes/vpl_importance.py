@@ -11,6 +11,9 @@ CELLS = 64
 """Cells along the side of an RSM face, each with one importance. A choice."""
 CELLS_OF_MANY = 32
 """The same with more than `FEW_FACES`. A choice."""
+MOST_CELLS = 1 << 20
+"""Cells of all faces, beyond which each face has half as many along its side, and so on. A choice: a quarter
+of the 65,535 workgroups that every driver takes in one dispatch."""
 RECEIVERS = 128
 """Surface points that stand for the image. A choice."""
 SPREAD = 16.0
@@ -37,7 +40,10 @@ _CELL_BYTES, _RECEIVER_BYTES = 32, 32
 
 def importance_cells(outer_faces: int) -> int:
     """Cells along the side of each RSM face, where so many lie in no other."""
-    return CELLS if outer_faces <= FEW_FACES else CELLS_OF_MANY
+    cells = CELLS if outer_faces <= FEW_FACES else CELLS_OF_MANY
+    while outer_faces * cells**2 > MOST_CELLS:
+        cells //= 2
+    return cells
 
 
 class VplImportancePass(FramePass):

@@ -11,6 +11,7 @@ from jaxtyping import Float32
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, placement
 from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.errors import MachineError
 from vpltune.renderer.frame.capture import CapturedFrame, capture_frame, read_image
 from vpltune.renderer.frame.clip_state import ClipState
 from vpltune.renderer.frame.frame import Frame, FrameSetup, frame_light_records
@@ -47,7 +48,14 @@ def _on_own_context(method: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(method)
     def on_own_context(self: "Runtime | DrawnFrame", *arguments: object, **keywords: object) -> Any:
         self.context.__enter__()
-        return method(self, *arguments, **keywords)
+        try:
+            return method(self, *arguments, **keywords)
+        except moderngl.Error as error:
+            # Targets that do not fit into memory leave a framebuffer incomplete; all else is a defect.
+            if "not complete" not in str(error):
+                raise
+            renderer = self.context.info["GL_RENDERER"]
+            raise MachineError(f"OpenGL: {error} ({renderer}); a smaller --size may do") from error
 
     return on_own_context
 

@@ -1,7 +1,11 @@
 """`vpltune doctor`: every probe answers here, and one that dies is a finding."""
 
 import json
+import os
+import re
+import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +15,7 @@ from vpltune.cli.program import run
 from vpltune.tuner.doctor.machine_findings import PROBES, Finding, Probe, run_probe
 from vpltune.tuner.doctor.machine_probes import PROBE_FUNCTIONS
 
+REPOSITORY = Path(__file__).resolve().parents[2]
 PROBE = Probe("thing", "mend the thing", True)
 
 
@@ -138,3 +143,19 @@ def test_without_the_tuner_the_verdict_says_what_can_be_done(capfd, monkeypatch)
     monkeypatch.setattr(vpltune.tuner.doctor.machine_findings, "examine_machine", lambda: findings)
     assert run(["doctor"]) == 0
     assert "This machine can render, export and import; fits need vpltune[tuner]." in capfd.readouterr().out
+
+
+def test_a_platform_that_jax_lacks_is_named():
+    """`JAX_PLATFORMS=cuda` without CUDA was a defect of ours to `fit`, and a missing JAX to `doctor`."""
+    program = (
+        "from vpltune.renderer.errors import MachineError\n"
+        "from vpltune.tuner.doctor.jax_platform import require_jax_platform\n"
+        "try: require_jax_platform()\n"
+        "except MachineError as error: print(error)"
+    )
+    for platform in ("cuda", "abacus"):
+        environment = {**os.environ, "JAX_PLATFORMS": platform, "PYTHONPATH": str(REPOSITORY)}
+        done = subprocess.run(
+            [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
+        )
+        assert re.fullmatch(rf"JAX_PLATFORMS={platform}: JAX cannot start \(.+\); unset it\n", done.stdout)

@@ -12,6 +12,7 @@ import shutil
 import sys
 from collections.abc import Callable, Mapping
 
+from vpltune.renderer.errors import MachineError
 from vpltune.tuner.doctor.extras import EXTRA_MODULES, how_to_install, missing_modules
 from vpltune.tuner.doctor.machine_findings import APT_LLVM, APT_OPENGL, PIP
 
@@ -86,6 +87,12 @@ def probe_jax() -> Said:
     """JAX, which has to compile and differentiate a function."""
     import jax
 
+    from vpltune.tuner.doctor.jax_platform import require_jax_platform
+
+    try:
+        require_jax_platform()
+    except MachineError as error:
+        return {"state": "missing", "detail": str(error), "mend": "unset JAX_PLATFORMS"}
     slope = jax.jit(jax.grad(lambda x: x**3))(2.0)
     if abs(float(slope) - 12.0) > 1e-4:
         return {

@@ -14,6 +14,7 @@ from vpltune.renderer.config.tuned_config import FitNote, TunedConfig, read_conf
 from vpltune.renderer.files.atomic_file import require_writable, write_text_whole, written_together
 from vpltune.renderer.files.strict_json import strict_json
 from vpltune.renderer.scene.views import write_views
+from vpltune.tuner.doctor.jax_platform import require_jax_platform
 from vpltune.tuner.evaluation.comparison_image import write_comparison
 from vpltune.tuner.evaluation.error_breakdown import error_breakdown
 from vpltune.tuner.evaluation.evaluate import Evaluation, evaluate
@@ -119,6 +120,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
     """
     watch = Stopwatch()
     require_writable(output)
+    require_jax_platform()
     prepared = prepare_scene(scene_path, options, options.start, watch, progress, validated=True)
     fitted = [view for view in prepared.views if view.view.split == "fitted"]
     drawn = [view.drawn_with.parameters for view in fitted if view.drawn_with is not None]

@@ -15,6 +15,7 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.parameter_block import BLOCK_BYTES
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import FitNote, TunedConfig
+from vpltune.renderer.errors import MachineError
 from vpltune.renderer.frame.frame import FrameSetup
 from vpltune.renderer.frame.runtime import KEPT_FRAMES, LAYERS, Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
@@ -284,3 +285,22 @@ def test_the_gpu_reads_the_parameters_that_were_given(runtime):
     )
     drawn = runtime.draw(VIEW, replace(PLAIN, parameters=parameters))
     assert drawn.frame.read_parameters() == parameters == drawn.read_parameters()
+
+
+@pytest.mark.parametrize(
+    ("said", "expected"),
+    [
+        ("the framebuffer is not complete (INCOMPLETE_ATTACHMENT)", MachineError),
+        ("GLSL Compiler failed", moderngl.Error),
+    ],
+)
+def test_targets_that_memory_cannot_hold_are_said(gl_context, monkeypatch, said, expected):
+    """A frame of 16,384² pixels on a small machine; other errors of OpenGL stay defects."""
+
+    def fail(*_, **__):
+        raise moderngl.Error(said)
+
+    runtime = Runtime(colored_room(), context=gl_context)
+    monkeypatch.setattr("vpltune.renderer.frame.frame.create_gbuffer", fail)
+    with pytest.raises(expected, match=said[:20]):
+        runtime.render(room_view("spot"), PLAIN)

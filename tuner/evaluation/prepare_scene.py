@@ -99,6 +99,7 @@ def prepare_scene(
     progress: Progress,
     *,
     validated: bool = False,
+    look_first: Callable[[Runtime, tuple[View, ...]], None] = lambda runtime, views: None,
 ) -> PreparedScene:
     """Read a scene, place its views, render their references, and capture the runtime's buffers.
 
@@ -110,9 +111,10 @@ def prepare_scene(
         progress: called with the name of a stage and the share of it that is done, in [0, 1].
         validated: whether to place validation views too, which cost a reference each, and to measure the
             statistics that a prior reads.
+        look_first: called before any reference is rendered; it may refuse what the fit could not do.
 
     Raises:
-        InputError: the scene or its sidecar cannot be used.
+        InputError: the scene or its sidecar cannot be used, or `look_first` refuses.
         MachineError: there is no OpenGL 4.5, or the GPU ran out of memory.
     """
     keep_compiled_functions()
@@ -122,6 +124,7 @@ def prepare_scene(
         views, notes = _views(scene, scene_path, options, validated)
         # Before the references, so that a machine without OpenGL fails at once.
         runtime = Runtime(scene)
+        look_first(runtime, views)
     with watch.stage("reference"):
         references = references_of(
             scene, views, options.seed, options.bounces, lambda share: progress("reference", share)

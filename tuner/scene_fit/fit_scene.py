@@ -4,6 +4,7 @@ import hashlib
 import importlib.metadata
 import platform
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,8 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters, placemen
 from vpltune.renderer.config.tuned_config import FitNote, TunedConfig, read_config, write_config
 from vpltune.renderer.files.atomic_file import require_writable, write_text_whole, written_together
 from vpltune.renderer.files.strict_json import strict_json
-from vpltune.renderer.scene.views import write_views
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.scene.views import View, write_views
 from vpltune.tuner.doctor.jax_platform import require_jax_platform
 from vpltune.tuner.evaluation.comparison_image import write_comparison
 from vpltune.tuner.evaluation.error_breakdown import error_breakdown
@@ -33,6 +35,8 @@ from vpltune.tuner.fitting.fit_density import FEW_VPLS, table_rotations
 from vpltune.tuner.fitting.fit_status import Descent, FitStatus, Outcome
 from vpltune.tuner.fitting.search_space import SearchSpace
 from vpltune.tuner.frame_time.fit_budget import BudgetOptions
+from vpltune.tuner.frame_time.frame_budget import LEAST_COUNT
+from vpltune.tuner.frame_time.least_frame import require_possible_budget
 from vpltune.tuner.reference.content_key import scene_digest
 from vpltune.tuner.scene_fit.fit_search import Search, search
 from vpltune.tuner.scene_fit.prior_in_fit import auto_candidate, fit_start, prior_metrics
@@ -121,7 +125,15 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
     watch = Stopwatch()
     require_writable(output)
     require_jax_platform()
-    prepared = prepare_scene(scene_path, options, options.start, watch, progress, validated=True)
+    prepared = prepare_scene(
+        scene_path,
+        options,
+        options.start,
+        watch,
+        progress,
+        validated=True,
+        look_first=partial(_require_budget, options),
+    )
     fitted = [view for view in prepared.views if view.view.split == "fitted"]
     drawn = [view.drawn_with.parameters for view in fitted if view.drawn_with is not None]
     start = replace(options.start, parameters=fit_start(options.start, drawn), auto=None)
@@ -179,6 +191,14 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
         write_config(folder / "tuned.json", config)
         write_text_whole(folder / "metrics.json", strict_json(document) + "\n")
     return FitResult(config, found.status, descent, evaluation, notes, document)
+
+
+def _require_budget(options: FitOptions, runtime: Runtime, views: tuple[View, ...]) -> None:
+    budget = options.budget
+    if budget is None or budget.milliseconds is None:
+        return
+    timed = replace(views[0], size=budget.frame_size or views[0].size)
+    require_possible_budget(runtime, timed, options.start, budget.milliseconds, LEAST_COUNT)
 
 
 @dataclass(frozen=True, eq=False)

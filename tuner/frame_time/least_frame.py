@@ -12,8 +12,8 @@ from vpltune.tuner.frame_time.cost_model import INTERLEAVES, MAP_SIZES, rsm_reso
 FRAMES = 3
 """Frames of the timing, of which the median is taken. A choice."""
 BEYOND_DOUBT = 1.25
-"""A budget is refused where the fastest frame takes so many times as long. A choice: other load may slow three
-frames down by less, and the fit itself settles closer calls."""
+"""A budget is refused where the fastest frame takes so many times as long. A choice: other load may slow
+three frames down by less, and the fit itself settles closer calls."""
 
 
 def require_possible_budget(

@@ -5,18 +5,19 @@ from built_scenes import room_view
 
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import InputError
+from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.frame_time.least_frame import require_possible_budget
 
 TIMES = {1: 40.0, 2: 15.0, 4: 10.0}
 
 
-class Timed:
+class Timed(Runtime):
     """A runtime whose frames take the times above, by interleaving."""
 
     def __init__(self):
         self.drawn = []
 
-    def frame_milliseconds(self, view, config, frames):
+    def frame_milliseconds(self, view, config, frames=5, lights=None):
         self.drawn.append(config)
         return TIMES[config.quality.interleave]
 

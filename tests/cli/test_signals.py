@@ -104,9 +104,7 @@ def test_one_that_asks_and_does_not_end_is_ended(tmp_path):
 
 def test_a_crash_is_said(tmp_path):
     """Libraries crash; the shell's own word for it names no program, and leaves temporary files."""
-    body = (
-        "with written_whole(Path('x.txt')):\n    print('ready', flush=True)\n    os.kill(os.getpid(), 11)"
-    )
+    body = "with written_whole(Path('x.txt')):\n    print('ready', flush=True)\n    os.kill(os.getpid(), 11)"
     process = started(body, tmp_path)
     _, said = process.communicate(timeout=60)
     assert (process.returncode, said) == (139, "vpltune: its process was killed by SIGSEGV\n")

@@ -370,9 +370,7 @@ def _keeps_prior(found: _Found, options: FitOptions) -> bool:
     return kept and options.start.auto is not None and options.budget is None
 
 
-def _config(
-    prepared: PreparedScene, found: _Found, options: FitOptions, scene_path: Path
-) -> TunedConfig:
+def _config(prepared: PreparedScene, found: _Found, options: FitOptions, scene_path: Path) -> TunedConfig:
     provenance: dict[str, str | int | float] = {
         "scene": prepared.scene.name,
         "scene_file_sha256": hashlib.sha256(scene_path.read_bytes()).hexdigest(),

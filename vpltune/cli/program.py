@@ -193,4 +193,3 @@ def _failure(exit_code: int, error: object) -> Report:
     print(f"{PROGRAM}: {line}", file=sys.stderr)
     status = "interrupted" if exit_code == INTERRUPTED else "failed"
     return Report({"status": status, "error": line}, (), exit_code)
-

@@ -120,6 +120,28 @@ def test_near_a_cut_disc_it_is_a_half_space():
     assert np.sqrt((error**2).mean()) < 0.05
 
 
+@pytest.mark.parametrize("height", [0.01, 0.03, 0.1, 0.4])
+def test_the_foot_of_a_wall_of_discs_is_evenly_lit(height):
+    """A floor before a wall that discs stand for, each of one square: 0.78 to 1.04 of the closed form.
+
+    Half of the wall's radiosity arrives at its foot. With a kernel no wider than the disc, the gaps between
+    discs got 0.06 to 0.6 of that. Heights are over the wall's plane, in squares.
+    """
+    radius = 1.0 / np.sqrt(np.pi)
+    along = np.linspace(0.0, 1.0, 33)
+    floor = np.stack([along, np.zeros(33), np.full(33, height)], axis=1)
+    up = np.tile([0.0, 1.0, 0.0], (33, 1))
+    rows = 10
+    found = sum(
+        form(floor - np.array([column, row + 0.5, 0.0]), up, radius) * radius**2
+        for row in range(rows)
+        for column in range(-rows, rows + 1)
+    )
+    expected = 0.5 * (1.0 - height / np.hypot(height, rows))
+    assert 0.75 < found.min() / expected
+    assert found.max() / expected < 1.06
+
+
 def test_share_and_centroid_of_a_part():
     """Against sums over a fine grid, 1e-3; the parts on both sides of a chord make the disc."""
     x, y = np.meshgrid(*[(np.arange(2000) + 0.5) / 1000.0 - 1.0] * 2)

@@ -47,7 +47,7 @@ from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
 
 GENERATED = 10
 """Generated scenes of each seed, two of a kind. A choice."""
-RESERVED = (*KEPT_AWAY, "gallery")
+RESERVED = KEPT_AWAY
 """Scenes from files that chose nothing."""
 ERROR_SIZE, TIMED_SIZE = (320, 180), (640, 360)
 """Width and height in pixels."""

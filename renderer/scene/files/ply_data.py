@@ -22,6 +22,7 @@ _BYTE_ORDERS: dict[str, Literal["<", ">", ""]] = {
     "binary_big_endian": ">",
     "ascii": "",
 }
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 # A choice: most bytes of a header.
 _LONGEST_HEADER = 1 << 16
 # A choice: most characters of a number in ASCII data.
@@ -75,18 +76,19 @@ def parse_ply_header(content: bytes) -> PlyHeader:
     Raises:
         SceneFileError: the content does not start with a valid PLY header.
     """
-    end = content.find(b"end_header", 0, _LONGEST_HEADER)
-    if not content.startswith(b"ply") or end < 0:
+    begin = len(_BYTE_ORDER_MARK) if content.startswith(_BYTE_ORDER_MARK) else 0
+    end = content.find(b"end_header", begin, _LONGEST_HEADER)
+    if not content.startswith(b"ply", begin) or end < 0:
         raise SceneFileError("header: must begin with 'ply' and end with 'end_header'")
     size = end + len(b"end_header")
     size += 2 if content[size : size + 2] == b"\r\n" else 1
     byte_order, texture_name, elements = None, "", []
-    for line in content[3:end].decode("utf-8", "replace").splitlines():
+    for line in content[begin + 3 : end].decode("utf-8", "replace").splitlines():
         words = line.split()
         match words:
             case ["format", name, *_] if name in _BYTE_ORDERS:
                 byte_order = _BYTE_ORDERS[name]
-            case ["element", name, count] if count.isdecimal() and len(count) < 13:
+            case ["element", name, count] if count.isascii() and count.isdecimal() and len(count) < 13:
                 elements.append(PlyElement(name, int(count)))
             case ["property", "list", count_type, type_, name] if elements and {count_type, type_} <= set(
                 _TYPES
@@ -242,6 +244,8 @@ def _ascii_numbers(body: bytes, decoded: DecodedBytes) -> Float64[np.ndarray, " 
             f"the data: a number must have at most {_LONGEST_NUMBER} characters, got {longest}"
         )
     try:
+        if b"_" in body:  # numpy reads 1_0 as 10
+            raise ValueError("'_' is not part of a number")
         return np.array(words, f"S{max(longest, 1)}").astype(np.float64)
     except ValueError as error:
         raise SceneFileError(f"the data: must be numbers ({error})") from error

@@ -68,6 +68,9 @@ def test_point_and_directional(tmp_path):
         ("[camera]\neye = [0, 0, 0]\nlook_at = [0, 0, 1]\nfov = 3\n", r"\[camera\]: unknown key 'fov'"),
         ("[camra]\n", "unknown key 'camra'"),
         ("[camera\n", "not TOML"),
+        ("a=" + "[" * 100_000, "not a sidecar .nested too deep"),
+        ("a=" + "[" * 400 + "]" * 400, "unknown key 'a'|nested too deep"),
+        ("#" * (1 << 20) + "#", "must have at most 1,048,576 bytes"),
         ("camera = 3\n", "must be a table, got int"),
         ("[camera]\neye = [0, 0, 0]\n", "key 'look_at' is missing"),
         (
@@ -83,7 +86,7 @@ def test_point_and_directional(tmp_path):
         (SPOT.replace("[[light]]", "[light]"), r"lights must be written as \[\[light\]\] tables"),
         (SPOT.replace("intensity = 10", "intensity = -1"), "'intensity' must not be negative"),
         (SPOT.replace("intensity = 10", "intensity = inf"), "'intensity' must be 1 or 3 finite numbers"),
-        (SPOT.replace("= 30", "= 70"), r"cone angles must satisfy 0 ≤ inner < outer"),
+        (SPOT.replace("= 30", "= 70"), r"cone angles must satisfy 0 ≤ inner ≤ outer ≤ 90 degrees"),
         (SPOT + "direction = [0, -1, 0]\n", "must have either 'direction' or 'look_at', got both"),
         (SPOT.replace("[0.0, 0.0, 2.0]", "[0.0, 2.0, 0.0]"), "direction must not be zero"),
         (SPOT.replace("spot", "point"), "unknown key 'look_at'"),
@@ -99,8 +102,14 @@ def test_what_cannot_be_used_is_refused_by_name(tmp_path, text, message):
 def test_a_sidecar_that_is_not_text_is_refused(tmp_path):
     path = tmp_path / "room.vpltune.toml"
     path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="not TOML"):
+    with pytest.raises(InputError, match="not UTF-8 text"):
         read_sidecar(path)
+
+
+def test_a_byte_order_mark_is_passed_over(tmp_path):
+    path = tmp_path / "room.vpltune.toml"
+    path.write_text("\ufeff" + CAMERA, encoding="utf-8")
+    assert read_sidecar(path)[0] is not None
 
 
 def test_flags_go_before_sidecar_before_file_before_automatic(tmp_path):

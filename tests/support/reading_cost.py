@@ -30,6 +30,12 @@ BATCH = (
 )
 """What a batch reads of a scene before it starts the fit with its limits."""
 
+IMAGES = (
+    "from pathlib import Path; from vpltune.tuner.evaluation.view_images import read_view_images",
+    "read_view_images(Path(sys.argv[1]))",
+)
+"""How a report reads a fit's images."""
+
 
 def check_cost(path: Path, how: tuple[str, str] = SCENE) -> str:
     """Read a file and hold the cost to the documented bound: 1 GiB, and 2 s with 3 µs for each byte.

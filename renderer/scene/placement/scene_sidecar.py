@@ -29,6 +29,7 @@ from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.small_text import read_small_text
 from vpltune.renderer.scene.placement.automatic_camera import default_camera, default_camera_for_lights
 from vpltune.renderer.scene.placement.automatic_light import default_light
+from vpltune.renderer.scene.placement.sidecar_file import near_miss, sidecar_path
 from vpltune.renderer.scene.placement.sight import lit_fraction, seen_by
 from vpltune.renderer.scene.placement.subject import space_of_view
 from vpltune.renderer.scene.scene import Camera, Light, LightKind, Scene, look_at
@@ -50,11 +51,6 @@ LIGHT_KEYS: dict[LightKind, tuple[str, ...]] = {
 _LARGEST_FILE = 1 << 20
 # A choice: if the scene file's lights reach a smaller share of the image than this, they are replaced.
 LEAST_LIT = 0.005
-
-
-def sidecar_path(scene_path: Path) -> Path:
-    """The path of a scene's sidecar, whether or not the file exists."""
-    return Path(scene_path).with_suffix(".vpltune.toml")
 
 
 def read_sidecar(path: Path) -> tuple[Camera | None, tuple[Light, ...] | None]:
@@ -103,15 +99,37 @@ def resolve_camera_and_lights(
     Raises:
         InputError: the sidecar exists but is invalid, or the scene has no triangles.
     """
-    if not scene.triangle_count():
-        raise InputError(f"{scene_path}: a scene must have at least one triangle, got none")
     path = sidecar_path(scene_path)
     camera, lights = read_sidecar(path) if path.exists() else (None, None)
     notes = []
-    if path.exists() and (camera_override is None or light_override is None):
-        notes.append(f"{' and '.join(_mentioned(camera, lights))} taken from {path.name}")
+    if camera_override is None or light_override is None:
+        if path.exists():
+            notes.append(f"{' and '.join(_mentioned(camera, lights))} taken from {path.name}")
+        elif (missed := near_miss(scene_path)) is not None:
+            notes.append(f"{missed} is not read: the scene's sidecar would be {path.name}")
     camera = camera_override or camera
     lights = light_override if light_override is not None else lights
+    camera, lights, more = completed_camera_and_lights(scene, scene_path, camera, lights)
+    return camera, lights, (*notes, *more)
+
+
+def completed_camera_and_lights(
+    scene: Scene, scene_path: Path, camera: Camera | None, lights: tuple[Light, ...] | None
+) -> tuple[Camera, tuple[Light, ...], tuple[str, ...]]:
+    """The camera and lights given, or else the scene file's, or else automatic ones; with notes.
+
+    Args:
+        scene: the scene.
+        scene_path: its file, for messages.
+        camera: None to choose one.
+        lights: None to choose them.
+
+    Raises:
+        InputError: the scene has no triangles.
+    """
+    if not scene.triangle_count():
+        raise InputError(f"{scene_path}: a scene must have at least one triangle, got none")
+    notes = []
     if camera is None and scene.cameras:
         camera = scene.cameras[0]
         if len(scene.cameras) > 1:

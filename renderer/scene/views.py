@@ -167,8 +167,8 @@ def _light_from_json(entry: Any, where: str) -> Light:
             raise InputError(f"{where}.direction: must not be zero")
         light["direction_world"] = direction / length
     if kind == "spot":
-        cone = (float(_numbers(entry, key, 1, where)[0]) for key in ("inner_cone", "outer_cone"))
-        light["inner_cone"], light["outer_cone"] = checked_cone(*cone, "radians", where)
+        inner, outer = (float(_numbers(entry, key, 1, where)[0]) for key in ("inner_cone", "outer_cone"))
+        light["inner_cone"], light["outer_cone"] = checked_cone(inner, outer, "radians", where)
     return Light(kind=kind, intensity=intensity, **light)
 
 

@@ -208,8 +208,8 @@ def _light(table: Any, where: str) -> Light:
         placed["direction_world"] = _direction(table, placed.get("position_world"), where)
     if kind == "spot":
         filled = {**DEFAULT_CONE_DEGREES, **table}
-        cone = (float(_numbers(filled, key, (1,), where)[0]) for key in DEFAULT_CONE_DEGREES)
-        placed["inner_cone"], placed["outer_cone"] = checked_cone(*cone, "degrees", where)
+        inner, outer = (float(_numbers(filled, key, (1,), where)[0]) for key in DEFAULT_CONE_DEGREES)
+        placed["inner_cone"], placed["outer_cone"] = checked_cone(inner, outer, "degrees", where)
     return Light(kind, np.broadcast_to(intensity, 3).copy(), **placed)
 
 

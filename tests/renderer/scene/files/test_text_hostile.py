@@ -157,3 +157,20 @@ def test_more_libraries_than_are_looked_for_are_refused(tmp_path):
     text = "mtllib " + " ".join(map(str, range(MOST_LIBRARIES + 1))) + "\n" + TRIANGLE + "f 1 2 3\n"
     with pytest.raises(InputError, match="mtllib: must name at most 1,000 libraries, got more"):
         read_bytes(tmp_path, text)
+
+
+@pytest.mark.parametrize(("word", "count"), [("1 ", 21_000_000), ("0.123456 ", 2_100_000)])
+def test_reading_ascii_ply_costs_little(tmp_path, word, count):
+    header = PLY.decode().replace("vertex 3", f"vertex {count // 3}")
+    (tmp_path / "scene.ply").write_text(header + word * count + "\n3 0 1 2\n")
+    assert "the scene has no triangles" in check_cost(tmp_path / "scene.ply")
+
+
+def test_numbers_across_borders_stay_whole(tmp_path):
+    count = 300_000
+    vertices = np.random.default_rng(0).random((count, 3)).round(6)
+    text = "\n".join(f"{x} {y} {z}" for x, y, z in vertices.tolist())
+    faces = "\n".join(f"3 {i} {i + 1} {i + 2}" for i in range(0, count, 3))
+    header = PLY.decode().replace("vertex 3", f"vertex {count}").replace("face 1", f"face {count // 3}")
+    (mesh,) = read_bytes(tmp_path, header + text + "\n" + faces + "\n", "a.ply").meshes
+    np.testing.assert_array_equal(mesh.positions[mesh.triangles.ravel()], vertices.astype(np.float32))

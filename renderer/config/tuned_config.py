@@ -35,6 +35,7 @@ from vpltune.renderer.config.gltf_extras import GLTF_SUFFIXES, read_gltf_extras
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
+from vpltune.renderer.files.small_text import read_small_text
 from vpltune.renderer.files.strict_json import DuplicateKeyError, unique_keys
 
 FORMAT = "vpltune"
@@ -142,18 +143,7 @@ def read_config(source: str | Path, *, check: bool = True) -> TunedConfig:
     path = Path(source)
     if path.suffix.lower() in GLTF_SUFFIXES:
         return parse_config(json.dumps(read_gltf_extras(path)), str(path), check=check)
-    try:
-        with path.open("rb") as file:
-            content = file.read(MAXIMUM_FILE_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    if len(content) > MAXIMUM_FILE_BYTES:
-        raise InputError(f"{path}: a config is at most {MAXIMUM_FILE_BYTES} bytes long, this file is longer")
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not UTF-8 text (byte {error.start})") from error
-    return parse_config(text, str(path), check=check)
+    return parse_config(read_small_text(path, MAXIMUM_FILE_BYTES), str(path), check=check)
 
 
 def parse_config(text: str, where: str, *, check: bool = True) -> TunedConfig:

@@ -11,13 +11,17 @@ from jaxtyping import Float64
 
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
+from vpltune.renderer.files.small_text import read_small_text
 from vpltune.renderer.scene.scene import Camera, Light, scaled_camera, scaled_light
+from vpltune.renderer.scene.spot_cone import checked_cone
 
 Split = Literal["fitted", "validation", "held_out"]
 """What a view is for. Parameters are fitted to `fitted` views, `validation` views choose between the
 candidates of a fit, and `held_out` views choose nothing: error is only measured on them."""
 SPLITS: tuple[Split, ...] = get_args(Split)
 """Every value of `Split`."""
+LARGEST_FILE = 1 << 24
+"""A choice: most bytes of a views.json. A view takes about 1 kB, and JSON 20 times its size in memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,11 +104,17 @@ def read_views(path: str | Path) -> tuple[View, ...]:
     Raises:
         InputError: the file cannot be read or is not JSON, or a key is missing or its value is not allowed.
     """
+    text = read_small_text(Path(path), LARGEST_FILE)
     try:
-        document = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    except ValueError as error:
+        return _views(text, path)
+    except RecursionError as error:
+        raise InputError(f"{path}: not views.json (nested too deep)") from error
+
+
+def _views(text: str, path: str | Path) -> tuple[View, ...]:
+    try:
+        document = json.loads(text)
+    except ValueError as error:  # bad syntax, or an integer of more than 4300 digits
         raise InputError(f"{path}: not JSON ({error})") from error
     entries = document.get("views") if isinstance(document, dict) else None
     if not isinstance(entries, list) or not entries:
@@ -157,27 +167,9 @@ def _light_from_json(entry: Any, where: str) -> Light:
             raise InputError(f"{where}.direction: must not be zero")
         light["direction_world"] = direction / length
     if kind == "spot":
-        light["inner_cone"] = float(_numbers(entry, "inner_cone", 1, where)[0])
-        light["outer_cone"] = float(_numbers(entry, "outer_cone", 1, where)[0])
-        check_cone(light["inner_cone"], light["outer_cone"], where)
+        inner, outer = (float(_numbers(entry, key, 1, where)[0]) for key in ("inner_cone", "outer_cone"))
+        light["inner_cone"], light["outer_cone"] = checked_cone(inner, outer, "radians", where)
     return Light(kind=kind, intensity=intensity, **light)
-
-
-def check_cone(inner_cone: float, outer_cone: float, where: str) -> None:
-    """Check the half angles of a spot, in radians, against the rule of KHR_lights_punctual.
-
-    Args:
-        inner_cone: radians.
-        outer_cone: radians; 1e-6 above π/2 is accepted, the rounding of single precision.
-        where: file and key, for the message.
-
-    Raises:
-        InputError: 0 ≤ inner_cone < outer_cone ≤ π/2 does not hold.
-    """
-    if not 0.0 <= inner_cone < outer_cone <= math.pi / 2 + 1e-6:
-        raise InputError(
-            f"{where}: cone angles must satisfy 0 ≤ inner < outer ≤ π/2, got {inner_cone} and {outer_cone}"
-        )
 
 
 def _member(entry: Any, key: str, where: str) -> Any:

@@ -46,6 +46,13 @@ def test_a_spot_light_without_cone_has_that_of_gltf():
     assert (light.inner_cone, light.outer_cone) == (0.0, pytest.approx(math.pi / 4))
 
 
+def test_a_cone_of_equal_angles_is_a_hard_edge():
+    light = light_from_flags(ViewFlags(**SPOT, light_direction="0,-1,0", light_cone="30,30"))
+    assert light.outer_cone == pytest.approx(math.radians(30.0))
+    # The falloff is a thousandth of the half angle: what the renderer needs to divide by.
+    assert 0.0 < light.outer_cone - light.inner_cone < 0.002 * light.outer_cone
+
+
 def test_one_intensity_is_white_and_three_are_a_colour():
     np.testing.assert_array_equal(light_from_flags(ViewFlags(**POINT)).intensity, [1.0, 1.0, 1.0])
     one = light_from_flags(ViewFlags(**POINT, light_intensity="7"))
@@ -98,9 +105,12 @@ REFUSED_LIGHTS = {
     "no direction": (SPOT | {"light_direction": "0,0,0"}, "--light-direction: must give the light"),
     "cone inside out": (
         SPOT | {"light_direction": "0,1,0", "light_cone": "30,10"},
-        "0 ≤ inner < outer ≤ π/2",
+        "0 ≤ inner ≤ outer ≤ 90 degrees and outer > 0, got 30 and 10",
     ),
-    "cone too wide": (SPOT | {"light_direction": "0,1,0", "light_cone": "30,91"}, "0 ≤ inner < outer ≤ π/2"),
+    "cone too wide": (
+        SPOT | {"light_direction": "0,1,0", "light_cone": "30,91"},
+        "0 ≤ inner ≤ outer ≤ 90 degrees and outer > 0, got 30 and 91",
+    ),
     "cone of one": (
         SPOT | {"light_direction": "0,1,0", "light_cone": "30"},
         "--light-cone: must be 2 finite",

@@ -18,6 +18,7 @@ from typing import Any
 
 from vpltune.renderer.config.tuned_config import parse_config
 from vpltune.renderer.files.atomic_file import write_text_whole
+from vpltune.renderer.scene.placement.sidecar_file import sidecar_path
 from vpltune.tuner.batch.job import JobOptions
 from vpltune.tuner.batch.referred_files import referred_files
 
@@ -64,7 +65,7 @@ class SceneInputs:
     def _hashed(self, scene: Path) -> list[list[Any]]:
         # The name is that of `renderer.scene.placement`, which is not imported because that takes half a
         # second.
-        sidecar = scene.with_suffix(".vpltune.toml")
+        sidecar = sidecar_path(scene)
         began = time.time_ns()
         entries = []
         for path in (scene, sidecar, *referred_files(scene)):

@@ -4,15 +4,18 @@ The list errs on the side of too many files: an extra one only means that a chan
 Paths that leave the scene's folder are left out, since the readers reject them.
 """
 
-import json
 import re
 import stat
 import struct
 import urllib.parse
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
+from vpltune.renderer.scene.files.diagnostics import SceneFileError
+from vpltune.renderer.scene.files.json_object import parse_json
 from vpltune.renderer.scene.files.limits import MAX_FILE_BYTES
+from vpltune.renderer.scene.files.mtl_materials import MOST_LIBRARIES, map_statement
 
 READ_SUFFIXES = (".gltf", ".glb", ".obj", ".ply")
 """Extensions of the scene files that `read_scene` reads."""
@@ -52,7 +55,7 @@ def _names(scene: Path) -> Iterator[str]:
         yield from _obj_names(scene)
     elif suffix == ".ply":
         for line in _TEXTURE_FILE.findall(_content(scene, _PLY_HEADER_BYTES)):
-            yield from _tails(line)
+            yield _text(line)
     elif suffix == MITSUBA_SUFFIX:
         for value in _XML_VALUE.findall(_content(scene)):
             yield value.decode("utf-8", "replace")
@@ -69,13 +72,11 @@ def _glb_json(scene: Path) -> bytes:
 
 def _gltf_uris(content: bytes) -> Iterator[str]:
     try:
-        document = json.loads(content)
-    except (ValueError, RecursionError):
-        return
-    if not isinstance(document, dict):
+        document = parse_json(content)
+    except SceneFileError:  # the reader refuses it too
         return
     for kind in ("buffers", "images"):
-        members = document.get(kind)
+        members = document.members.get(kind)
         for member in members if isinstance(members, list) else ():
             uri = member.get("uri") if isinstance(member, dict) else None
             if isinstance(uri, str) and uri[:5].lower() != "data:":
@@ -84,22 +85,32 @@ def _gltf_uris(content: bytes) -> Iterator[str]:
 
 
 def _obj_names(scene: Path) -> Iterator[str]:
-    for line in _MTLLIB.findall(_content(scene)):
-        # The line holds one name that may contain spaces, or several names.
-        for name in (line, *line.split()):
-            library = _inside(scene.parent, text := name.decode("utf-8", "replace").strip())
-            if library is None:
-                continue
-            yield text
-            for mapped in _MAP.findall(_content(library)):
-                yield from _tails(mapped)
+    read: set[Path] = set()
+    # The reader refuses a scene with more libraries.
+    for name in islice(_library_names(_content(scene)), 2 * MOST_LIBRARIES):
+        library = _inside(scene.parent, name)
+        if library is None:
+            continue
+        yield name
+        if library not in read:
+            read.add(library)
+            for mapped in dict.fromkeys(_MAP.findall(_content(library))):
+                yield map_statement(_text(mapped.split(b"#", 1)[0])).path
 
 
-def _tails(line: bytes) -> Iterator[str]:
-    """Every tail of the line that starts at a word: options precede the name, which may contain spaces."""
-    text = line.decode("utf-8", "replace").strip()
-    for word in re.finditer(r"\S+", text):
-        yield text[word.start() :]
+def _library_names(content: bytes) -> Iterator[str]:
+    """Each once. A line holds one name that may contain spaces, or several names."""
+    told: set[str] = set()
+    for line in _MTLLIB.findall(content):
+        text = _text(line)
+        for name in (text, *text.split()):
+            if name not in told:
+                told.add(name)
+                yield name
+
+
+def _text(line: bytes) -> str:
+    return line.decode("utf-8", "replace").strip()
 
 
 def _inside(folder: Path, name: str) -> Path | None:

@@ -13,12 +13,13 @@ There is one file for each fit. The members of a view have its index in metrics.
 Row 0 is at the top. Irradiance relative to its mean fits half floats at any scale and in any unit.
 """
 
+import math
 import zipfile
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from jaxtyping import Bool, Float32
@@ -33,6 +34,13 @@ MAXIMUM_PIXELS = 256 * 192
 MAXIMUM_VIEWS = {"fitted": 16, "held_out": 8}
 """Number of views that are kept of each split, the first ones. A choice: with `MAXIMUM_PIXELS`, it limits the
 file to 60 MB."""
+# Twice what the most views of the most pixels take: six bytes for each of eight images, and one for `valid`.
+_MOST_BYTES = 2 * sum(MAXIMUM_VIEWS.values()) * MAXIMUM_PIXELS * (8 * 6 + 1)
+# The versions of numpy's format that it writes itself.
+_HEADERS = {
+    (1, 0): np.lib.format.read_array_header_1_0,
+    (2, 0): np.lib.format.read_array_header_2_0,
+}
 # What numpy raises for a damaged archive; TypeError is for a file with a single array, which is no archive.
 _UNREADABLE = (
     OSError,
@@ -133,12 +141,39 @@ def read_view_images(path: Path) -> tuple[ViewImages, ...]:
     if not path.exists():
         return ()
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            members = {name: archive[name] for name in archive.files}
+        with path.open("rb") as file:
+            _check_size(file, path)
+            with np.load(file, allow_pickle=False) as archive:
+                members = {name: archive[name] for name in archive.files}
+    except InputError:
+        raise
     except _UNREADABLE as error:
         raise InputError(f"{path}: not a readable images.npz ({error})") from error
     indices = sorted({int(name.partition("/")[0]) for name in members if name.partition("/")[0].isdecimal()})
     return tuple(_view(path, index, members) for index in indices)
+
+
+def _check_size(file: IO[bytes], path: Path) -> None:
+    """Refuse an archive that unpacks to more than a fit writes: zeros take a thousandth of that in the file.
+
+    numpy allocates what the header of a member says, so the headers are read first.
+    """
+    left = _MOST_BYTES
+    with zipfile.ZipFile(file) as archive:
+        for member in archive.infolist():
+            with archive.open(member) as stream:
+                version = np.lib.format.read_magic(stream)
+                read_header = _HEADERS.get(version)
+                if read_header is None:
+                    raise InputError(f"{path}: member {member.filename!r:.60} has an unknown version")
+                shape, _, dtype = read_header(stream)
+            left -= max(math.prod(shape) * dtype.itemsize, member.file_size)
+            if left < 0:
+                raise InputError(
+                    f"{path}: its arrays must take at most {_MOST_BYTES >> 20} MiB together, and "
+                    f"{member.filename!r:.60} exceeds that"
+                )
+    file.seek(0)
 
 
 def _view(path: Path, index: int, members: dict[str, np.ndarray]) -> ViewImages:

@@ -110,7 +110,8 @@ def parse_numbers(text: str, flag: str, counts: tuple[int, ...]) -> list[float]:
     """
     need = " or ".join(str(count) for count in counts)
     try:
-        numbers = [float(item) for item in text.split(",")]
+        # Python also reads 1_0 as a number.
+        numbers = [float(item) for item in text.split(",")] if text.isascii() and "_" not in text else []
     except ValueError:
         numbers = []
     # 1e30: its square still fits double precision, and views.json has the same limit.

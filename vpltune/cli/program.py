@@ -27,6 +27,7 @@ from vpltune.cli.evaluate import evaluate
 from vpltune.cli.export import export
 from vpltune.cli.fit import fit
 from vpltune.cli.import_scene import import_scene
+from vpltune.cli.init import init
 from vpltune.cli.render import render
 from vpltune.cli.report import (
     BAD_INPUT,
@@ -66,6 +67,7 @@ COMMANDS = {
     "doctor": doctor,
     "bench": bench,
     "import": import_scene,
+    "init": init,
 }
 for name, command in COMMANDS.items():
     # Benchmarks are not part of the installed package.

@@ -9,7 +9,7 @@ from vpltune.cli.options import parse_numbers
 from vpltune.cli.view_options import ViewFlags
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.scene import Camera, Light, look_at
-from vpltune.renderer.scene.views import check_cone
+from vpltune.renderer.scene.spot_cone import checked_cone
 
 DEFAULT_YFOV_DEGREES = 50.0
 """Vertical field of view. A choice."""
@@ -105,8 +105,7 @@ def _direction(flags: ViewFlags) -> Float64[np.ndarray, "3"]:
 
 def _cone(text: str | None) -> tuple[float, float]:
     inner, outer = DEFAULT_CONE_DEGREES if text is None else parse_numbers(text, "--light-cone", (2,))
-    check_cone(math.radians(inner), math.radians(outer), "--light-cone (radians)")
-    return math.radians(inner), math.radians(outer)
+    return checked_cone(inner, outer, "degrees", "--light-cone")
 
 
 def _refuse(present: list[str], light_type: str, *flags: str) -> None:

@@ -10,6 +10,7 @@ from vpltune.renderer.scene.files.gltf_document import GltfDocument
 from vpltune.renderer.scene.files.json_object import JsonObject
 from vpltune.renderer.scene.files.limits import LARGEST_RADIOMETRIC
 from vpltune.renderer.scene.scene import Camera, Light, without_scale
+from vpltune.renderer.scene.spot_cone import softened
 
 
 def read_camera(
@@ -71,7 +72,7 @@ def read_light(
     if (color < 0.0).any():
         raise SceneFileError(f"{light.at('color')}: must not be negative, got {color.tolist()}")
     strength = light.number("intensity", 1.0, low=0.0, high=LARGEST_RADIOMETRIC)
-    inner, outer = _cone(light) if kind == "spot" else (0.0, math.pi / 4)
+    inner, outer = _cone(light, document) if kind == "spot" else (0.0, math.pi / 4)
     if kind != "directional" and "range" in light.members:
         light.number("range")
         document.warnings.add("a light's range is ignored: light falls off as 1/d² at any distance")
@@ -96,17 +97,23 @@ def read_light(
     )
 
 
-def _cone(light: JsonObject) -> tuple[float, float]:
+def _cone(light: JsonObject, document: GltfDocument) -> tuple[float, float]:
     spot = light.object("spot") or JsonObject({}, light.at("spot"))
     inner = spot.number("innerConeAngle", 0.0)
     outer = spot.number("outerConeAngle", math.pi / 4)
     # 1e-6 accepts π/2 in single precision.
-    if not 0.0 <= inner < outer <= math.pi / 2 + 1e-6:
+    if not (0.0 <= inner <= outer <= math.pi / 2 + 1e-6 and outer > 0.0):
         raise SceneFileError(
             f"{spot.where}: cone angles must satisfy 0 ≤ innerConeAngle < outerConeAngle ≤ π/2, "
             f"got {inner:g} and {outer:g}"
         )
-    return inner, min(outer, math.pi / 2)
+    if inner == outer:
+        # Not allowed by KHR_lights_punctual, but Blender writes it for a spot without blend.
+        document.warnings.tally(
+            "1 spot has equal cone angles; it has a hard edge",
+            "{n} spots have equal cone angles; they have hard edges",
+        )
+    return softened(inner, min(outer, math.pi / 2))
 
 
 def _unit(vector: Float64[np.ndarray, "3"], where: str) -> Float64[np.ndarray, "3"]:

@@ -1,13 +1,15 @@
 """Wavefront MTL: the diffuse colour and map of materials. A diffuse material has no use for the rest."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float32
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, label, one_line
 from vpltune.renderer.scene.files.image_texels import MTL_FORMATS, ImageDecoder
+from vpltune.renderer.scene.files.plain_numbers import plain_number
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
+from vpltune.renderer.scene.files.text_lines import first_word, text_lines
 from vpltune.renderer.scene.scene import Material, Texture, Wrap
 
 # Options of map_Kd and how many words follow each. The options in `_TRANSFORMS` take one to three numbers.
@@ -23,13 +25,53 @@ _MAP_OPTIONS = {
     "-cc": 1,
 }
 _TRANSFORMS = ("-o", "-s", "-t")
+MOST_LIBRARIES = 1000
+"""A choice: names of material libraries that are looked for. A file has one; a lookup takes about 20 µs."""
+# A choice: materials that libraries define. Each takes about 300 bytes.
+_MOST_DEFINITIONS = 100_000
 
 
 @dataclass(eq=False)
 class _Definition:
-    diffuse: Float32[np.ndarray, "3"] = field(default_factory=lambda: np.ones(3, np.float32))
+    diffuse: Float32[np.ndarray, "3"] | None = None
+    """None where no Kd says it: white."""
     map_path: str = ""
     wrap: Wrap = "repeat"
+    opacity: float | None = None
+    """As `d` says it, or else 1 − `Tr`. None where neither does."""
+
+
+@dataclass(frozen=True)
+class MapStatement:
+    """What a `map_Kd` statement says."""
+
+    path: str
+    """The rest of the line after the options, blanks included."""
+    clamps: bool
+    ignored: tuple[str, ...]
+    """Options that move or scale the image."""
+
+
+def map_statement(rest: str) -> MapStatement:
+    """Options and path of a map statement.
+
+    Args:
+        rest: the line without its keyword.
+    """
+    words = rest.split()
+    at, clamps, ignored = 0, False, []
+    while at < len(words) and words[at].startswith("-") and at + 1 < len(words):
+        option = words[at]
+        clamps |= option == "-clamp" and words[at + 1] == "on"
+        if option in _TRANSFORMS:
+            ignored.append(option)
+            at += 1
+            while at < len(words) - 1 and _is_number(words[at]):
+                at += 1
+        else:
+            at += 1 + _MAP_OPTIONS.get(option, 0)
+    path = rest.split(None, at)[at] if at < len(words) else ""
+    return MapStatement(path.strip(), clamps, tuple(dict.fromkeys(ignored)))
 
 
 class MtlMaterials:
@@ -42,6 +84,7 @@ class MtlMaterials:
         self._definitions: dict[str, _Definition] = {}
         self._texture_indices: dict[tuple[str, Wrap], int | None] = {}
         self._missing_maps: list[str] = []
+        self._libraries: dict[str, bool] = {}
         self.materials: list[Material] = []
         self.textures: list[Texture] = []
 
@@ -51,16 +94,13 @@ class MtlMaterials:
         A library that cannot be read adds a warning.
 
         Raises:
-            SceneFileError: a library breaks a rule.
+            SceneFileError: a library breaks a rule, or too many are named.
         """
-        try:
-            self._read_one(names)
-        except FileNotFoundError:
-            for name in names.split():
-                try:
-                    self._read_one(name)
-                except FileNotFoundError:
-                    self._warnings.add(f"material library {name!r:.80} cannot be read; white is used")
+        if self._read_once(names):
+            return
+        for name in names.split():
+            if not self._read_once(name):
+                self._warnings.add(f"material library {name!r:.80} cannot be read; white is used")
 
     def add(self, name: str) -> int:
         """Create a material, white if no library defines it, and return its index in `materials`.
@@ -75,7 +115,19 @@ class MtlMaterials:
                 "{n} materials are not defined in any library; white is used",
             )
         definition = definition or _Definition()
-        self.materials.append(Material(label(name, "default"), definition.diffuse, self._texture(definition)))
+        if definition.opacity is not None and definition.opacity < 1.0:
+            self._warnings.tally(
+                "1 material is see-through (d, Tr); it is drawn opaque",
+                "{n} materials are see-through (d, Tr); they are drawn opaque",
+            )
+        texture = self._texture(definition)
+        diffuse = np.ones(3, np.float32) if definition.diffuse is None else definition.diffuse
+        if texture is not None and not diffuse.any():
+            self._warnings.tally(
+                "1 material is black: its Kd 0 0 0 multiplies its map_Kd",
+                "{n} materials are black: their Kd 0 0 0 multiplies their map_Kd",
+            )
+        self.materials.append(Material(label(name, "default"), diffuse, texture))
         return len(self.materials) - 1
 
     def say_what_is_missing(self) -> None:
@@ -106,33 +158,49 @@ class MtlMaterials:
         self.textures.append(Texture(label(path, "map_Kd"), texels, definition.wrap, definition.wrap))
         return len(self.textures) - 1
 
-    def _read_one(self, name: str) -> None:
+    def _read_once(self, name: str) -> bool:
+        """Whether a library can be read. It is read where it is first named."""
+        if name not in self._libraries:
+            if len(self._libraries) == MOST_LIBRARIES:
+                raise SceneFileError(f"mtllib: must name at most {MOST_LIBRARIES:,} libraries, got more")
+            self._libraries[name] = self._read_one(name)
+        return self._libraries[name]
+
+    def _read_one(self, name: str) -> bool:
         try:
             content = self._folder.read(name.replace("\\", "/"), "mtllib")
-        except SceneFileError as error:
-            raise FileNotFoundError(name) from error
+        except SceneFileError:
+            return False
         definition: _Definition | None = None
-        for number, line in enumerate(content.decode("utf-8", "replace").splitlines(), 1):
-            words = line.split("#", 1)[0].split(None, 1)
-            if not words:
-                continue
-            keyword, rest = words[0], words[1].strip() if len(words) > 1 else ""
-            where = f"{name!r:.80} line {number}"
-            if keyword == "newmtl":
+        for number, line in text_lines(content, f"{name!r:.80}"):
+            keyword, rest = first_word(line.split(b"#", 1)[0])
+            if keyword == b"newmtl":
                 definition = self._definitions.setdefault(rest, _Definition())
-            elif definition is not None:
-                self._read_statement(definition, keyword, rest, where)
+                if len(self._definitions) > _MOST_DEFINITIONS:
+                    raise SceneFileError(f"{name!r:.80}: must define at most {_MOST_DEFINITIONS:,} materials")
+            elif definition is not None and keyword:
+                where = f"{name!r:.80} line {number}"
+                self._read_statement(definition, keyword.decode("utf-8", "replace"), rest, where)
+        return True
 
     def _read_statement(self, definition: _Definition, keyword: str, rest: str, where: str) -> None:
         if keyword == "Kd":
             definition.diffuse = self._albedo(self._color(rest, where))
         elif keyword.lower() == "map_kd":
-            self._read_map(definition, rest)
+            said = map_statement(rest)
+            definition.map_path = said.path
+            definition.wrap = "clamp_to_edge" if said.clamps else "repeat"
+            for option in said.ignored:
+                self._warnings.add(f"map_Kd option {option} is ignored")
         elif keyword == "Ke" and self._color(rest, where).any():
             self._warnings.tally(
                 "1 material emits light; emission does not light the scene yet",
                 "{n} materials emit light; emission does not light the scene yet",
             )
+        elif keyword == "d":
+            definition.opacity = _leading_number(rest.removeprefix("-halo"), 1.0)
+        elif keyword == "Tr" and definition.opacity is None:
+            definition.opacity = 1.0 - _leading_number(rest, 0.0)
         elif keyword in ("map_d", "map_Tr"):
             self._warnings.tally(
                 "1 material has an opacity map; it is drawn opaque",
@@ -145,7 +213,8 @@ class MtlMaterials:
             self._warnings.add(f"colours given as {words[0]} are not supported; white is used")
             return np.ones(3, np.float32)
         try:
-            color = np.array(words[:3] * (3 if len(words) == 1 else 1), np.float32)
+            numbers = [plain_number(word) for word in words[:3]]
+            color = np.array(numbers * (3 if len(words) == 1 else 1), np.float32)
         except ValueError:
             color = np.empty(0, np.float32)
         if color.shape != (3,) or not np.isfinite(color).all():
@@ -160,27 +229,15 @@ class MtlMaterials:
             )
         return np.clip(color, 0.0, 1.0)
 
-    def _read_map(self, definition: _Definition, rest: str) -> None:
-        words = rest.split()
-        at = 0
-        while at < len(words) and words[at].startswith("-") and at + 1 < len(words):
-            option = words[at]
-            if option == "-clamp" and words[at + 1] == "on":
-                definition.wrap = "clamp_to_edge"
-            if option in _TRANSFORMS:
-                self._warnings.add(f"map_Kd option {option} is ignored")
-                at += 1
-                while at < len(words) - 1 and _is_number(words[at]):
-                    at += 1
-            else:
-                at += 1 + _MAP_OPTIONS.get(option, 0)
-        # The path is the rest of the line, including spaces.
-        definition.map_path = rest.split(None, at)[at] if at < len(words) else ""
+
+def _leading_number(text: str, absent: float) -> float:
+    words = text.split()
+    return plain_number(words[0]) if words and _is_number(words[0]) else absent
 
 
 def _is_number(word: str) -> bool:
     try:
-        float(word)
+        plain_number(word)
     except ValueError:
         return False
     return True

@@ -4,6 +4,8 @@ trimesh 5.2 is not used because it splits concave faces as fans, counts negative
 file instead of from the current line, and silently drops normals, textures and whole materials.
 """
 
+from array import array
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,75 +14,51 @@ from jaxtyping import Float32, Float64, Int64
 
 from vpltune.renderer.files.srgb import linear_from_srgb
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, label
-from vpltune.renderer.scene.files.limits import DecodedBytes
+from vpltune.renderer.scene.files.limits import MAX_INSTANCES, DecodedBytes
 from vpltune.renderer.scene.files.mtl_materials import MtlMaterials
+from vpltune.renderer.scene.files.plain_numbers import finite_numbers, plain_index
 from vpltune.renderer.scene.files.polygon_triangulation import triangulated
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
 from vpltune.renderer.scene.files.surface import Surface, finished_mesh, used_vertices
+from vpltune.renderer.scene.files.text_lines import first_word, text_lines
 from vpltune.renderer.scene.scene import Instance, Mesh, Scene
 
 # Grouping, levels of detail and display hints, which do not change the surface: no warning for these.
 _SILENT_KEYWORDS = frozenset(
-    (
-        "o",
-        "g",
-        "s",
-        "mg",
-        "lod",
-        "usemap",
-        "maplib",
-        "bevel",
-        "c_interp",
-        "d_interp",
-        "shadow_obj",
-        "trace_obj",
-    )
+    b"o g s mg lod usemap maplib bevel c_interp d_interp shadow_obj trace_obj".split()
 )
 # Free-form curves and surfaces, which are ignored with a warning.
 _FREE_FORM_KEYWORDS = frozenset(
-    (
-        "vp",
-        "cstype",
-        "deg",
-        "bmat",
-        "step",
-        "curv",
-        "curv2",
-        "surf",
-        "parm",
-        "trim",
-        "hole",
-        "scrv",
-        "sp",
-        "end",
-        "con",
-        "ctech",
-        "stech",
-    )
+    b"vp cstype deg bmat step curv curv2 surf parm trim hole scrv sp end con ctech stech".split()
 )
-# Estimated memory in bytes of the Python objects for one line while the text is parsed.
-_BYTES_PER_LINE = 300
-
-
-@dataclass
-class _Faces:
-    """Faces of one material: corners as indices into `_ObjText.corners`, and each face's corner count."""
-
-    corners: list[int] = field(default_factory=list)
-    sizes: list[int] = field(default_factory=list)
+# Bytes of memory for a v, vt or vn line, and for a corner of a face: measured at the peak, with all copies.
+_BYTES_PER_LINE, _BYTES_PER_CORNER = 64, 100
 
 
 @dataclass
 class _ObjText:
-    """The parsed lines of an OBJ file."""
+    """The parsed lines of an OBJ file in flat arrays, since Python objects take ten times the memory."""
 
-    vertices: list[list[str]] = field(default_factory=list)
-    uvs: list[list[str]] = field(default_factory=list)
-    normals: list[list[str]] = field(default_factory=list)
-    corners: dict[tuple[int, int, int], int] = field(default_factory=dict)
-    """The index of each distinct (vertex, uv, normal). These count from 0; −1 if absent."""
-    faces: dict[str, _Faces] = field(default_factory=dict)
-    libraries: list[str] = field(default_factory=list)
+    decoded: DecodedBytes
+    vertices: array = field(default_factory=lambda: array("d"))
+    """Three numbers for each v."""
+    colors: array = field(default_factory=lambda: array("d"))
+    """Three numbers for each v that has a colour."""
+    colored: array = field(default_factory=lambda: array("i"))
+    """Which these are."""
+    uvs: array = field(default_factory=lambda: array("d"))
+    """Two numbers for each vt."""
+    normals: array = field(default_factory=lambda: array("d"))
+    """Three numbers for each vn."""
+    corners: array = field(default_factory=lambda: array("i"))
+    """Vertex, uv and normal of every face's corners, from 0; −1 if absent."""
+    sizes: array = field(default_factory=lambda: array("i"))
+    """Corner count of each face."""
+    face_materials: array = field(default_factory=lambda: array("i"))
+    """Each face's material, as its place in `materials`."""
+    materials: dict[str, int] = field(default_factory=dict)
+    """The names that faces use, with their place."""
+    libraries: dict[str, None] = field(default_factory=dict)
 
 
 def read_obj(path: Path, warnings: Warnings) -> Scene:
@@ -94,12 +72,8 @@ def read_obj(path: Path, warnings: Warnings) -> Scene:
         SceneFileError: the text breaks a rule, an index is out of range, or a number is not finite.
     """
     folder = SceneFolder(path)
-    content = folder.read_scene_file(path)
-    if b"\0" in content:
-        raise SceneFileError("must be text in UTF-8 or an eight-bit encoding")
     decoded = DecodedBytes()
-    decoded.spend(_BYTES_PER_LINE * content.count(b"\n"), "the text")
-    text = _parse(content.decode("utf-8", "replace"), warnings)
+    text = _parse(folder.read_scene_file(path), warnings, decoded)
     materials = MtlMaterials(folder, warnings)
     for library in text.libraries:
         materials.read_library(library)
@@ -115,95 +89,103 @@ def read_obj(path: Path, warnings: Warnings) -> Scene:
     )
 
 
-def _parse(content: str, warnings: Warnings) -> _ObjText:
-    text = _ObjText()
-    faces = text.faces.setdefault("", _Faces())
-    for number, line in enumerate(content.replace("\\\r\n", " ").replace("\\\n", " ").split("\n"), 1):
-        words = line.split()
-        if not words or words[0].startswith("#"):
-            continue
-        keyword = words[0]
-        if keyword == "v":
-            text.vertices.append(words[1:])
-        elif keyword == "vt":
-            text.uvs.append(words[1:])
-        elif keyword == "vn":
-            text.normals.append(words[1:])
-        elif keyword in ("f", "fo"):
-            _parse_face(words, text, faces, f"line {number}", warnings)
-        elif keyword == "usemtl":
-            faces = text.faces.setdefault(_rest(line), _Faces())
-        elif keyword == "mtllib":
-            text.libraries.append(_rest(line))
-        elif keyword in ("p", "l"):
+def _parse(content: bytes, warnings: Warnings, decoded: DecodedBytes) -> _ObjText:
+    text = _ObjText(decoded)
+    material = ""
+    for number, line in text_lines(content, ""):
+        keyword = (line.split(None, 1) or [b"#"])[0]
+        if keyword in (b"v", b"vt", b"vn"):
+            _parse_numbers(keyword, _words(line), text, number)
+        elif keyword in (b"f", b"fo"):
+            _parse_face(_words(line), text, material, f"line {number}", warnings)
+        elif keyword == b"usemtl":
+            material = first_word(line)[1]
+        elif keyword == b"mtllib":
+            text.libraries[first_word(line)[1]] = None
+        elif keyword in (b"p", b"l"):
             warnings.tally("1 point or line element is ignored", "{n} point or line elements are ignored")
         elif keyword in _FREE_FORM_KEYWORDS:
             warnings.add("free-form curves and surfaces are ignored")
-        elif keyword not in _SILENT_KEYWORDS:
+        elif not keyword.startswith(b"#") and keyword not in _SILENT_KEYWORDS:
             warnings.tally(
                 "1 line with an unknown keyword is ignored", "{n} lines with unknown keywords are ignored"
             )
     return text
 
 
-def _rest(line: str) -> str:
-    words = line.strip().split(None, 1)
-    return words[1].strip() if len(words) > 1 else ""
+def _words(line: bytes) -> list[bytes]:
+    """The words after the keyword, without a comment at the line's end."""
+    return line.split(b"#", 1)[0].split()[1:]
 
 
-def _parse_face(words: list[str], text: _ObjText, faces: _Faces, where: str, warnings: Warnings) -> None:
-    if len(words) < 4:
+def _parse_numbers(keyword: bytes, words: list[bytes], text: _ObjText, number: int) -> None:
+    """A v, vt or vn line. A v may have a colour: x y z r g b, or x y z w r g b."""
+    text.decoded.spend(_BYTES_PER_LINE, "the vertices")
+    what = f"line {number}: {keyword.decode()}"
+    if keyword == b"vt":
+        # A vt with one number gets 0 for the second.
+        text.uvs.extend(finite_numbers([*words, b"0"] if len(words) == 1 else words, 2, what))
+    elif keyword == b"vn":
+        text.normals.extend(finite_numbers(words, 3, what))
+    else:
+        if len(words) >= 6:
+            text.colored.append(len(text.vertices) // 3)
+            text.colors.extend(finite_numbers(words[-3:], 3, f"{what} colour"))
+        text.vertices.extend(finite_numbers(words, 3, what))
+
+
+def _parse_face(words: list[bytes], text: _ObjText, material: str, where: str, warnings: Warnings) -> None:
+    if len(words) < 3:
         warnings.tally(
             "1 face of fewer than 3 corners is ignored", "{n} faces of fewer than 3 corners are ignored"
         )
         return
-    for word in words[1:]:
-        faces.corners.append(_corner(word, text, where))
-    faces.sizes.append(len(words) - 1)
+    text.decoded.spend(_BYTES_PER_CORNER * len(words), "the faces")
+    counts = (len(text.vertices) // 3, len(text.uvs) // 2, len(text.normals) // 3)
+    for word in words:
+        text.corners.extend(_corner(word, counts, where))
+    text.sizes.append(len(words))
+    if material not in text.materials and len(text.materials) == MAX_INSTANCES:
+        raise SceneFileError(f"{where}: faces must use at most {MAX_INSTANCES:,} materials, got more")
+    text.face_materials.append(text.materials.setdefault(material, len(text.materials)))
 
 
-def _corner(word: str, text: _ObjText, where: str) -> int:
-    """The index of a corner written as `v`, `v/vt`, `v//vn` or `v/vt/vn`."""
-    parts = word.split("/")
-    lists = (text.vertices, text.uvs, text.normals)
+def _corner(word: bytes, counts: tuple[int, int, int], where: str) -> list[int]:
+    """Vertex, uv and normal of a corner written as `v`, `v/vt`, `v//vn` or `v/vt/vn`."""
+    parts = word.split(b"/")
     resolved = [-1, -1, -1]
     if len(parts) > 3 or not parts[0]:
-        raise SceneFileError(f"{where}: a corner must be written v, v/vt, v//vn or v/vt/vn, got {word!r:.40}")
+        shown = word.decode("utf-8", "replace")
+        raise SceneFileError(
+            f"{where}: a corner must be written v, v/vt, v//vn or v/vt/vn, got {shown!r:.40}"
+        )
     for i, part in enumerate(parts):
         if not part:
             continue
         try:
-            index = int(part)
+            index = plain_index(part)
         except ValueError:
             index = 0
         # Forward references are allowed and checked at the end. Negative indices count back from this line.
-        resolved[i] = index - 1 if index > 0 else len(lists[i]) + index
+        resolved[i] = index - 1 if index > 0 else counts[i] + index
         if index == 0 or resolved[i] < 0:
+            shown = word.decode("utf-8", "replace")
             raise SceneFileError(
-                f"{where}: an index must be a whole number other than 0 and in range, got {word!r:.40}"
+                f"{where}: an index must be a whole number other than 0 and in range, got {shown!r:.40}"
             )
-    key = (resolved[0], resolved[1], resolved[2])
-    return text.corners.setdefault(key, len(text.corners))
+    return resolved
 
 
 def _meshes(
     text: _ObjText, materials: MtlMaterials, warnings: Warnings, decoded: DecodedBytes, name: str
 ) -> list[Mesh]:
-    if not text.corners:
+    if not text.sizes:
         return []
-    keys = np.array(list(text.corners), np.int64)
-    vertices, colors = _vertices(text.vertices, warnings)
-    pools = (vertices, _numbers(text.uvs, 2, "vt"), _numbers(text.normals, 3, "vn"))
-    for column, (pool, keyword) in enumerate(zip(pools, ("v", "vt", "vn"), strict=True)):
-        if keys[:, column].max() >= len(pool):
-            raise SceneFileError(
-                f"faces: {keyword} index must be at most {len(pool)}, got {keys[:, column].max() + 1}"
-            )
+    vertices, colors = _vertices(text, warnings)
+    pools = (vertices, _rows(text.uvs, 2), _rows(text.normals, 3))
+    keys, key_of_corner = _distinct(text.corners, pools)
     meshes = []
-    for material, faces in text.faces.items():
-        if not faces.sizes:
-            continue
-        corners, sizes = np.array(faces.corners, np.int64), np.array(faces.sizes, np.int64)
+    for material, sizes, corners in _faces_by_material(text, key_of_corner):
         cut = triangulated(sizes, vertices[keys[corners, 0]], f"material {material!r:.60}")
         used, renumbered = used_vertices(corners[cut.ravel()], len(keys))
         surface = _surface(keys[used], renumbered.reshape(-1, 3), pools, colors)
@@ -215,6 +197,39 @@ def _meshes(
     return meshes
 
 
+def _distinct(
+    corners: array, pools: tuple[np.ndarray, np.ndarray, np.ndarray]
+) -> tuple[Int64[np.ndarray, "keys 3"], Int64[np.ndarray, " corners"]]:
+    """The distinct corners (vertex, uv, normal), and for each corner which of them it is."""
+    rows = np.frombuffer(corners, np.int32).reshape(-1, 3)
+    for column, (pool, keyword) in enumerate(zip(pools, ("v", "vt", "vn"), strict=True)):
+        if rows[:, column].max() >= len(pool):
+            raise SceneFileError(
+                f"faces: {keyword} index must be at most {len(pool)}, got {rows[:, column].max() + 1}"
+            )
+    # One number for the pair first: the product of all three counts may exceed 64 bits.
+    pairs = (rows[:, 1] + np.int64(1)) * (len(pools[2]) + 1) + (rows[:, 2] + 1)
+    found, pair_of_corner = np.unique(pairs, return_inverse=True)
+    numbers = rows[:, 0] * np.int64(len(found)) + pair_of_corner.reshape(-1)
+    _, first, key_of_corner = np.unique(numbers, return_index=True, return_inverse=True)
+    return rows[first].astype(np.int64), key_of_corner.reshape(-1).astype(np.int64)
+
+
+def _faces_by_material(
+    text: _ObjText, key_of_corner: Int64[np.ndarray, " corners"]
+) -> Iterator[tuple[str, Int64[np.ndarray, " faces"], Int64[np.ndarray, " corners"]]]:
+    """The faces of each material: its name, their corner counts, and their corners as distinct ones."""
+    sizes = np.frombuffer(text.sizes, np.int32).astype(np.int64)
+    starts = np.cumsum(sizes) - sizes
+    material_of_face = np.frombuffer(text.face_materials, np.int32)
+    order = np.argsort(material_of_face, kind="stable")
+    ends = np.cumsum(np.bincount(material_of_face))
+    for material, faces in zip(text.materials, np.split(order, ends[:-1]), strict=True):
+        own = sizes[faces]
+        within = np.arange(own.sum()) - np.repeat(np.cumsum(own) - own, own)
+        yield material, own, key_of_corner[np.repeat(starts[faces], own) + within]
+
+
 def _surface(
     keys: Int64[np.ndarray, "used 3"],
     triangles: Int64[np.ndarray, "triangles 3"],
@@ -222,53 +237,44 @@ def _surface(
     colors: Float32[np.ndarray, "v 3"] | None,
 ) -> Surface:
     vertices, uvs, normals = pools
-    uv = normal = None
-    if (keys[:, 1] >= 0).any():
-        # Corners without a uv have the index −1, which picks the row of zeros at the end.
-        uv = np.concatenate([uvs * (1.0, -1.0) + (0.0, 1.0), np.zeros((1, 2))])[keys[:, 1]].astype(np.float32)
-    if (keys[:, 2] >= 0).any():
-        normal = np.concatenate([normals, np.zeros((1, 3))])[keys[:, 2]].astype(np.float32)
+    uv = _picked(uvs, keys[:, 1])
+    # v points up in OBJ, and down from the first row in a scene. Corners without a uv have (0, 0) there.
+    if uv is not None:
+        uv[:, 1] = np.where(keys[:, 1] >= 0, 1.0 - uv[:, 1], 0.0)
     return Surface(
         vertices[keys[:, 0]].astype(np.float32),
         triangles,
-        normal,
+        _picked(normals, keys[:, 2]),
         uv,
         None if colors is None else colors[keys[:, 0]],
     )
 
 
+def _picked(
+    pool: Float64[np.ndarray, "rows columns"], indices: Int64[np.ndarray, " used"]
+) -> Float32[np.ndarray, "used columns"] | None:
+    """Rows of the pool, zero where the index is −1; None if all are. Takes time for the used rows alone."""
+    present = indices >= 0
+    if not present.any():
+        return None
+    picked = np.zeros((len(indices), pool.shape[1]), np.float32)
+    picked[present] = pool[indices[present]]
+    return picked
+
+
 def _vertices(
-    lines: list[list[str]], warnings: Warnings
+    text: _ObjText, warnings: Warnings
 ) -> tuple[Float64[np.ndarray, "v 3"], Float32[np.ndarray, "v 3"] | None]:
-    """Positions, and vertex colours if any line has them: x y z r g b, or x y z w r g b."""
-    positions = _numbers(lines, 3, "v")
-    colored = [i for i, words in enumerate(lines) if len(words) >= 6]
-    if not colored:
+    """Positions, and vertex colours if any line has them, white for the others."""
+    positions = _rows(text.vertices, 3)
+    if not text.colored:
         return positions, None
-    encoded = np.ones((len(lines), 3), np.float32)
-    encoded[colored] = _numbers([lines[i][-3:] for i in colored], 3, "v colour").astype(np.float32)
+    encoded = np.ones((len(positions), 3), np.float32)
+    encoded[np.frombuffer(text.colored, np.int32)] = _rows(text.colors, 3)
     if encoded.min() < 0.0 or encoded.max() > 1.0:
         warnings.add("vertex colours outside [0, 1] are clamped")
     return positions, linear_from_srgb(np.clip(encoded, 0.0, 1.0))
 
 
-def _numbers(lines: list[list[str]], count: int, keyword: str) -> Float64[np.ndarray, "lines count"]:
-    """The first `count` numbers of each line. A vt with one number gets 0 for the second."""
-    if keyword == "vt":
-        lines = [words if len(words) > 1 else [*words, "0"] for words in lines]
-    try:
-        values = np.array([words[:count] for words in lines], np.float64).reshape(len(lines), count)
-    except ValueError:
-        values = np.full((1, 1), np.nan)
-    # Larger coordinates make no sense and would overflow float32.
-    if not (np.abs(values) <= 1e30).all():
-        bad = next((words for words in lines if not _all_finite(words[:count], count)), [])
-        raise SceneFileError(f"{keyword}: must be {count} finite numbers, got {' '.join(bad)!r:.60}")
-    return values
-
-
-def _all_finite(words: list[str], count: int) -> bool:
-    try:
-        return len(words) == count and all(abs(float(word)) <= 1e30 for word in words)
-    except ValueError:
-        return False
+def _rows(numbers: array, count: int) -> Float64[np.ndarray, "rows count"]:
+    return np.array(numbers, np.float64).reshape(-1, count)

@@ -22,8 +22,11 @@ _BYTE_ORDERS: dict[str, Literal["<", ">", ""]] = {
     "binary_big_endian": ">",
     "ascii": "",
 }
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 # A choice: most bytes of a header.
 _LONGEST_HEADER = 1 << 16
+# A choice: bytes of ASCII data that are split at a time. A word takes 40 bytes of memory then.
+_CHUNK = 1 << 20
 # A choice: most characters of a number in ASCII data.
 _LONGEST_NUMBER = 64
 
@@ -75,18 +78,19 @@ def parse_ply_header(content: bytes) -> PlyHeader:
     Raises:
         SceneFileError: the content does not start with a valid PLY header.
     """
-    end = content.find(b"end_header", 0, _LONGEST_HEADER)
-    if not content.startswith(b"ply") or end < 0:
+    begin = len(_BYTE_ORDER_MARK) if content.startswith(_BYTE_ORDER_MARK) else 0
+    end = content.find(b"end_header", begin, _LONGEST_HEADER)
+    if not content.startswith(b"ply", begin) or end < 0:
         raise SceneFileError("header: must begin with 'ply' and end with 'end_header'")
     size = end + len(b"end_header")
     size += 2 if content[size : size + 2] == b"\r\n" else 1
     byte_order, texture_name, elements = None, "", []
-    for line in content[3:end].decode("utf-8", "replace").splitlines():
+    for line in content[begin + 3 : end].decode("utf-8", "replace").splitlines():
         words = line.split()
         match words:
             case ["format", name, *_] if name in _BYTE_ORDERS:
                 byte_order = _BYTE_ORDERS[name]
-            case ["element", name, count] if count.isdecimal() and len(count) < 13:
+            case ["element", name, count] if count.isascii() and count.isdecimal() and len(count) < 13:
                 elements.append(PlyElement(name, int(count)))
             case ["property", "list", count_type, type_, name] if elements and {count_type, type_} <= set(
                 _TYPES
@@ -234,14 +238,30 @@ def _no_rows(p: PlyProperty) -> Int64[np.ndarray, "0"] | None:
 
 
 def _ascii_numbers(body: bytes, decoded: DecodedBytes) -> Float64[np.ndarray, " numbers"]:
+    # A number takes at least a digit and a blank. Memory that stays unused is never touched.
     decoded.spend(4 * len(body), "the data")
-    words = body.split()
-    longest = max(map(len, words), default=0)
-    if longest > _LONGEST_NUMBER:
-        raise SceneFileError(
-            f"the data: a number must have at most {_LONGEST_NUMBER} characters, got {longest}"
-        )
-    try:
-        return np.array(words, f"S{max(longest, 1)}").astype(np.float64)
-    except ValueError as error:
-        raise SceneFileError(f"the data: must be numbers ({error})") from error
+    numbers = np.empty(len(body) // 2 + 1)
+    count = start = 0
+    while start < len(body):
+        end = start + _CHUNK
+        # Not within a number, unless it is too long.
+        end += len(body[end : end + _LONGEST_NUMBER + 1].split(None, 1)[0]) if _cuts_a_word(body, end) else 0
+        words = body[start:end].split()
+        longest = max(map(len, words), default=0)
+        if longest > _LONGEST_NUMBER:
+            raise SceneFileError(
+                f"the data: a number must have at most {_LONGEST_NUMBER} characters, got {longest}"
+            )
+        try:
+            if b"_" in body[start:end]:  # numpy reads 1_0 as 10
+                raise ValueError("'_' is not part of a number")
+            numbers[count : count + len(words)] = np.array(words, f"S{max(longest, 1)}").astype(np.float64)
+        except ValueError as error:
+            raise SceneFileError(f"the data: must be numbers ({error})") from error
+        count += len(words)
+        start = end
+    return numbers[:count]
+
+
+def _cuts_a_word(body: bytes, at: int) -> bool:
+    return at < len(body) and not body[at - 1 : at].isspace() and not body[at : at + 1].isspace()

@@ -101,6 +101,11 @@ class MaterialReader:
             return self._blend(bsdf)
         if bsdf.type not in _DIFFUSE_NAMES:
             raise SceneFileError(f"{bsdf.where}: unsupported material type")
+        if bsdf.child("metallic") is not None or _is_metallic(bsdf):
+            self._warnings.tally(
+                "1 principled material is metallic, which is drawn as matt",
+                "{n} principled materials are metallic, which is drawn as matt",
+            )
         if bsdf.type not in ("diffuse", "roughdiffuse"):
             self._warnings.tally(
                 "1 material has gloss, which is ignored; its diffuse part is kept",
@@ -201,6 +206,10 @@ class MaterialReader:
         color = np.clip(base_color, 0.0, 1.0).astype(np.float32)
         self.materials.append(Material(f"{name} {len(self.materials)}", color, texture))
         return Surfacing(len(self.materials) - 1, np.eye(3) if to_uv is None else to_uv)
+
+
+def _is_metallic(bsdf: Plugin) -> bool:
+    return bsdf.type == "principled" and bsdf.number("metallic", 0.0) > 0.0
 
 
 def _to_uv(texture: Plugin) -> Float64[np.ndarray, "3 3"]:

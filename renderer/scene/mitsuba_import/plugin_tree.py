@@ -19,6 +19,9 @@ _OBJECTS = frozenset(
         "shape", "subsurface", "texture", "volume",
     )
 )  # fmt: skip
+# A choice: most characters of an attribute once its defaults are put in, and of all these together.
+# Defaults may hold other defaults, so that a kilobyte can ask for a terabyte.
+_LONGEST_VALUE, _LONGEST_TOGETHER = 1 << 16, 1 << 24
 Value = float | bool | str | np.ndarray
 V = TypeVar("V")
 """Type of a plugin's value."""
@@ -42,6 +45,8 @@ class Plugin:
     """Numbers, booleans, strings, vectors and colours [3] and transforms [4, 4], by snake_case name."""
     children: list[tuple[str, "Plugin"]] = field(default_factory=list)
     """Nested or referenced plugins, each with its snake_case name, or an empty one."""
+    search_paths: list[tuple[str, str]] = field(default_factory=list)
+    """The folders of a scene's <path> elements, each with its line and tag."""
 
     def number(self, name: str, absent: float) -> float:
         """A number."""
@@ -109,6 +114,7 @@ class _Reader:
     def __init__(self) -> None:
         self._defaults: dict[str, str] = {}
         self._named: dict[str, Plugin] = {}
+        self._left = _LONGEST_TOGETHER
 
     def plugin(self, node: XmlNode) -> Plugin:
         kind = label(attribute(node, "type"), "?") if node.tag != "scene" else "scene"
@@ -129,6 +135,8 @@ class _Reader:
         elif tag == "ref":
             name = child.attributes.get("name", "")
             made.children.append((_snake_case(name), self._referred(child, attribute(child, "id"))))
+        elif tag == "path" and made.kind == "scene":
+            made.search_paths.append((attribute(child, "value"), child.where))
         elif tag in _OBJECTS:
             made.children.append((_snake_case(child.attributes.get("name", "")), self.plugin(child)))
         else:
@@ -142,14 +150,27 @@ class _Reader:
     def _substitute_defaults(self, node: XmlNode) -> None:
         """Replace each $name by its default, in the attributes of a node and of a transform's steps."""
         for key, text in node.attributes.items():
-            for name in re.findall(r"\$(\w+)", text):
-                if name not in self._defaults:
-                    raise SceneFileError(f"{node.where}: {key}: ${name:.60} has no <default>")
-                text = text.replace(f"${name}", self._defaults[name])
-            node.attributes[key] = text
+            if "$" in text:
+                node.attributes[key] = self._with_defaults(text, f"{node.where}: {key}")
         if node.tag == "transform":
             for step in node.children:
                 self._substitute_defaults(step)
+
+    def _with_defaults(self, text: str, where: str) -> str:
+        # Every second part is a name.
+        parts = re.split(r"\$(\w+)", text)
+        for i in range(1, len(parts), 2):
+            if parts[i] not in self._defaults:
+                raise SceneFileError(f"{where}: ${parts[i]:.60} has no <default>")
+            parts[i] = self._defaults[parts[i]]
+        length = sum(map(len, parts))
+        self._left -= length
+        if length > _LONGEST_VALUE or self._left < 0:
+            raise SceneFileError(
+                f"{where}: with its defaults, it must have at most {_LONGEST_VALUE:,} characters, "
+                f"and all together {_LONGEST_TOGETHER:,}"
+            )
+        return "".join(parts)
 
 
 def _value(node: XmlNode) -> Value:

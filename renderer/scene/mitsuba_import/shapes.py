@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float32, Float64, Int64
@@ -10,9 +9,9 @@ from jaxtyping import Float32, Float64, Int64
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
 from vpltune.renderer.scene.files.obj_scene import read_obj
 from vpltune.renderer.scene.files.ply_scene import read_ply
-from vpltune.renderer.scene.files.scene_folder import SceneFolder
 from vpltune.renderer.scene.files.surface import Surface
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
+from vpltune.renderer.scene.mitsuba_import.searched_folder import SearchedFolder
 from vpltune.renderer.scene.scene import Mesh
 
 # A choice: segments of a circle, and twice the rings of a sphere. 80 segments lose 0.1 % of a circle's area.
@@ -28,20 +27,23 @@ class Shape:
     """Such as the centre and radius of a sphere; the identity if there are none."""
 
 
-def shape_triangles(shape: Plugin, path: Path, folder: SceneFolder, warnings: Warnings) -> Shape:
+def shape_triangles(shape: Plugin, folder: SearchedFolder, warnings: Warnings) -> Shape | None:
     """The triangles of a shape. The origin of texture coordinates is at the top left, as in Mitsuba and glTF.
 
     Args:
         shape: the plugin.
-        path: the scene file; mesh files must be in its folder or below.
-        folder: that folder.
+        folder: where mesh files are looked for.
         warnings: takes a line for each approximation.
+
+    Returns:
+        None if a mesh file has no triangle with area.
 
     Raises:
         SceneFileError: the shape type is unsupported, a value is invalid, or a mesh file cannot be read.
     """
     if shape.type in ("obj", "ply"):
-        return Shape(_from_file(shape, path, folder, warnings), np.eye(4))
+        surface = _from_file(shape, folder, warnings)
+        return None if surface is None else Shape(surface, np.eye(4))
     make = _ANALYTIC.get(shape.type)
     if make is None:
         known = ", ".join(("obj", "ply", *_ANALYTIC))
@@ -52,14 +54,14 @@ def shape_triangles(shape: Plugin, path: Path, folder: SceneFolder, warnings: Wa
     return made
 
 
-def _from_file(shape: Plugin, path: Path, folder: SceneFolder, warnings: Warnings) -> Surface:
+def _from_file(shape: Plugin, folder: SearchedFolder, warnings: Warnings) -> Surface | None:
     name = shape.text("filename")
     if not folder.has(name, shape.where):
         raise SceneFileError(f"{shape.where}: {name!r:.80} does not exist")
     reader = read_obj if shape.type == "obj" else read_ply
     said = Warnings()
     try:
-        scene = reader(path.parent / name, said)
+        scene = reader(folder.found(name, shape.where), said)
     except SceneFileError as error:
         raise SceneFileError(f"{shape.where}: {name!r:.80}: {error}") from error
     for line in scene.warnings:
@@ -68,7 +70,7 @@ def _from_file(shape: Plugin, path: Path, folder: SceneFolder, warnings: Warning
             warnings.add(f"{name!r:.80}: {line}")
     meshes = scene.meshes
     if not meshes:
-        raise SceneFileError(f"{shape.where}: {name!r:.80} has no triangles")
+        return None
     surface = _joined(meshes)
     if shape.type == "ply" and surface.uv is not None:
         # Our PLY reader flips v, as most programs that write PLY expect. Mitsuba does not, so undo it.

@@ -8,10 +8,9 @@ from jaxtyping import Float64
 
 from vpltune.renderer.files.srgb import linear_from_srgb
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
+from vpltune.renderer.scene.files.plain_numbers import plain_number
 from vpltune.renderer.scene.mitsuba_import.xml_tree import XmlNode
 
-# A choice: numbers beyond this are rejected, so that sums and products stay finite in float64.
-_LARGEST = 1e30
 # A choice: wavelength bands in nm over which a sampled spectrum is averaged, for red, green and blue.
 _BANDS = ((580.0, 680.0), (490.0, 580.0), (420.0, 490.0))
 
@@ -35,10 +34,10 @@ def numbers(node: XmlNode, key: str, count: int) -> Float64[np.ndarray, " count"
     """
     words = attribute(node, key).replace(",", " ").split()
     try:
-        found = [float(word) for word in words]
+        found = [plain_number(word) for word in words]
     except ValueError:
         found = [math.nan]
-    if len(found) != count or not all(abs(number) <= _LARGEST for number in found):
+    if len(found) != count or math.isnan(found[0]):
         plural = "s" * (count > 1)
         raise SceneFileError(
             f"{node.where}: {key} must be {count} finite number{plural}, got {node.attributes[key]!r:.60}"
@@ -81,11 +80,11 @@ def color(node: XmlNode) -> Float64[np.ndarray, "3"]:
 def _sampled_spectrum(node: XmlNode, text: str) -> Float64[np.ndarray, "3"]:
     try:
         pairs = np.array(
-            [[float(part) for part in word.split(":")] for word in text.replace(",", " ").split()]
+            [[plain_number(part) for part in word.split(":")] for word in text.replace(",", " ").split()]
         )
     except ValueError:
         pairs = np.full((1, 2), math.nan)
-    if pairs.ndim != 2 or pairs.shape[1] != 2 or not (np.abs(pairs) <= _LARGEST).all():
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or np.isnan(pairs).any():
         raise SceneFileError(f"{node.where}: a spectrum must be wavelength:value pairs, got {text!r:.60}")
     pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
     return np.array([np.interp(np.linspace(*band, 16), pairs[:, 0], pairs[:, 1]).mean() for band in _BANDS])

@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, label
 
-# A choice: most elements of a document, far above those of real scenes.
-_MOST_NODES = 1_000_000
+# A choice: most elements of a document, far above those of real scenes. Each takes up to 1.5 kB.
+_MOST_NODES = 500_000
 # A choice: deepest nesting of elements, far above that of real scenes.
 _DEEPEST = 64
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, slots=True)
 class XmlNode:
     """An XML element. Its text is dropped, since Mitsuba's elements have none."""
 

@@ -26,12 +26,14 @@ import numpy as np
 from jaxtyping import Float64
 
 from vpltune.renderer.errors import InputError
+from vpltune.renderer.files.small_text import read_small_text
 from vpltune.renderer.scene.placement.automatic_camera import default_camera, default_camera_for_lights
 from vpltune.renderer.scene.placement.automatic_light import default_light
+from vpltune.renderer.scene.placement.sidecar_file import near_miss, sidecar_path
 from vpltune.renderer.scene.placement.sight import lit_fraction, seen_by
 from vpltune.renderer.scene.placement.subject import space_of_view
 from vpltune.renderer.scene.scene import Camera, Light, LightKind, Scene, look_at
-from vpltune.renderer.scene.views import check_cone
+from vpltune.renderer.scene.spot_cone import checked_cone
 
 # A choice: vertical field of view if a camera gives none.
 DEFAULT_YFOV_DEGREES = 60.0
@@ -45,13 +47,10 @@ LIGHT_KEYS: dict[LightKind, tuple[str, ...]] = {
     "point": ("type", "position", "intensity"),
     "directional": ("type", "direction", "look_at", "position", "intensity"),
 }
+# A choice: most bytes of a sidecar, which usually has 500.
+_LARGEST_FILE = 1 << 20
 # A choice: if the scene file's lights reach a smaller share of the image than this, they are replaced.
 LEAST_LIT = 0.005
-
-
-def sidecar_path(scene_path: Path) -> Path:
-    """The path of a scene's sidecar, whether or not the file exists."""
-    return Path(scene_path).with_suffix(".vpltune.toml")
 
 
 def read_sidecar(path: Path) -> tuple[Camera | None, tuple[Light, ...] | None]:
@@ -61,10 +60,16 @@ def read_sidecar(path: Path) -> tuple[Camera | None, tuple[Light, ...] | None]:
         InputError: the file cannot be read or is not TOML, a key is unknown or missing, or a value is not
             allowed.
     """
+    text = read_small_text(path, _LARGEST_FILE)
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+        return _parsed(text, path)
+    except RecursionError as error:
+        raise InputError(f"{path}: not a sidecar (nested too deep)") from error
+
+
+def _parsed(text: str, path: Path) -> tuple[Camera | None, tuple[Light, ...] | None]:
+    try:
+        document = tomllib.loads(text)
     except ValueError as error:
         raise InputError(f"{path}: not TOML ({error})") from error
     _check_keys(document, ("camera", "light"), str(path))
@@ -94,15 +99,37 @@ def resolve_camera_and_lights(
     Raises:
         InputError: the sidecar exists but is invalid, or the scene has no triangles.
     """
-    if not scene.triangle_count():
-        raise InputError(f"{scene_path}: a scene must have at least one triangle, got none")
     path = sidecar_path(scene_path)
     camera, lights = read_sidecar(path) if path.exists() else (None, None)
     notes = []
-    if path.exists() and (camera_override is None or light_override is None):
-        notes.append(f"{' and '.join(_mentioned(camera, lights))} taken from {path.name}")
+    if camera_override is None or light_override is None:
+        if path.exists():
+            notes.append(f"{' and '.join(_mentioned(camera, lights))} taken from {path.name}")
+        elif (missed := near_miss(scene_path)) is not None:
+            notes.append(f"{missed} is not read: the scene's sidecar would be {path.name}")
     camera = camera_override or camera
     lights = light_override if light_override is not None else lights
+    camera, lights, more = completed_camera_and_lights(scene, scene_path, camera, lights)
+    return camera, lights, (*notes, *more)
+
+
+def completed_camera_and_lights(
+    scene: Scene, scene_path: Path, camera: Camera | None, lights: tuple[Light, ...] | None
+) -> tuple[Camera, tuple[Light, ...], tuple[str, ...]]:
+    """The camera and lights given, or else the scene file's, or else automatic ones; with notes.
+
+    Args:
+        scene: the scene.
+        scene_path: its file, for messages.
+        camera: None to choose one.
+        lights: None to choose them.
+
+    Raises:
+        InputError: the scene has no triangles.
+    """
+    if not scene.triangle_count():
+        raise InputError(f"{scene_path}: a scene must have at least one triangle, got none")
+    notes = []
     if camera is None and scene.cameras:
         camera = scene.cameras[0]
         if len(scene.cameras) > 1:
@@ -181,9 +208,8 @@ def _light(table: Any, where: str) -> Light:
         placed["direction_world"] = _direction(table, placed.get("position_world"), where)
     if kind == "spot":
         filled = {**DEFAULT_CONE_DEGREES, **table}
-        cone = [math.radians(float(_numbers(filled, key, (1,), where)[0])) for key in DEFAULT_CONE_DEGREES]
-        placed["inner_cone"], placed["outer_cone"] = cone
-        check_cone(cone[0], cone[1], where)
+        inner, outer = (float(_numbers(filled, key, (1,), where)[0]) for key in DEFAULT_CONE_DEGREES)
+        placed["inner_cone"], placed["outer_cone"] = checked_cone(inner, outer, "degrees", where)
     return Light(kind, np.broadcast_to(intensity, 3).copy(), **placed)
 
 

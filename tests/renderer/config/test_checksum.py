@@ -3,6 +3,7 @@
 import json
 import re
 
+import numpy as np
 import pytest
 from config_documents import OLDER_QUALITY, any_document, document, older_document
 from hypothesis import given, settings
@@ -172,3 +173,31 @@ def test_an_older_file_has_none_and_its_successor_has():
     config = parse_config(json.dumps(older_document()), "text")
     points = TunedConfig(point_vpls(), quality=OLDER_QUALITY)
     assert written(config)["checksum"] == written(points)["checksum"]
+
+
+def test_no_flipped_bit_passes_for_another_config():
+    """A flip is refused, or the text still means the same: the 17th digit of a number, the e of an exponent.
+
+    A flip in the name of the checksum must not do away with it.
+    """
+    text = config_text(CONFIG).encode()
+    name = text.index(b"checksum")
+    places = {*range(name - 4, name + 12), *np.random.default_rng(0).integers(0, len(text), 60).tolist()}
+    for place in places:
+        for bit in range(8):
+            flipped = bytearray(text)
+            flipped[place] ^= 1 << bit
+            try:
+                read = parse_config(flipped.decode("utf-8", "replace"), "text")
+            except InputError:
+                continue
+            assert read == CONFIG, (text[place - 10 : place + 10], bytes(flipped[place - 10 : place + 10]))
+
+
+@pytest.mark.parametrize("key", ["Checksum", "check_sum", "checksun", "\u0441hecksum"])
+def test_a_near_miss_of_the_key_is_refused(key):
+    edited = written()
+    edited[key] = edited.pop("checksum")
+    for check in (True, False):
+        with pytest.raises(InputError, match="unknown key"):
+            parse_config(json.dumps(edited), "text", check=check)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from reading_cost import BATCH, check_cost
 from scene_paths import OUTSIDE_SCENES
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
@@ -172,3 +173,20 @@ def test_scenes_of_others_are_found_and_what_is_left_is_mitsubas(scenes_folder, 
     tuned = {f"{folder}/{file}" for folder, file in OUTSIDE_SCENES.items()}
     assert tuned < found
     assert {Path(name).name for name in found - tuned} == {"scene.xml"}
+
+
+@pytest.mark.parametrize(
+    ("obj", "mtl"),
+    [
+        ("mtllib scene.mtl\n", "newmtl a\nmap_Kd" + " a" * 200_000 + "\n"),
+        ("mtllib scene.mtl\n", "newmtl a\n" + "map_Kd a b c.png\n" * 200_000),
+        ("".join(f"mtllib a{i}\n" for i in range(200_000)), ""),
+        ("mtllib" + " scene.mtl" * 200_000 + "\n", "newmtl a\nmap_Kd a.png\n" * 1000),
+    ],
+    ids=["words", "lines", "libraries", "one library"],
+)
+def test_looking_for_files_takes_time_by_the_byte(tmp_path, obj, mtl):
+    """It happens before the limits of a fit begin."""
+    (tmp_path / "scene.obj").write_text(obj)
+    (tmp_path / "scene.mtl").write_text(mtl)
+    check_cost(tmp_path / "scene.obj", BATCH)

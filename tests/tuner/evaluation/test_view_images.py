@@ -1,10 +1,12 @@
 """images.npz: what was drawn is read back, at any scale, within its bounds; what is broken is refused."""
 
 import io
+import zipfile
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from reading_cost import IMAGES, check_cost
 
 from vpltune.renderer.errors import InputError
 from vpltune.tuner.evaluation.view_images import (
@@ -111,3 +113,20 @@ def test_what_is_broken_is_refused_by_name(tmp_path):
         np.savez_compressed(path, **changed)
         with pytest.raises(InputError, match=message):
             read_view_images(path)
+
+
+def test_an_archive_that_unpacks_to_gigabytes_is_refused(tmp_path):
+    path = tmp_path / "images.npz"
+    np.savez_compressed(path, **{"0/valid": np.zeros((20_000, 60_000), bool)})
+    assert path.stat().st_size < 4_000_000
+    assert "its arrays must take at most 110 MiB together, and '0/valid.npy' exceeds" in check_cost(
+        path, IMAGES
+    )
+    # A header alone can ask for as much.
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        header, {"descr": "|b1", "fortran_order": False, "shape": (1 << 40, 1 << 20)}
+    )
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("0/valid.npy", header.getvalue())
+    assert "exceeds" in check_cost(path, IMAGES)

@@ -61,16 +61,28 @@ def test_point_and_directional(triangle, kind):
         ({"color": [1, 1]}, r"lights\[0\]\.color: must be a list of 3 finite numbers"),
         ({"type": "laser"}, r"lights\[0\]\.type: must be 'point', 'spot' or 'directional', got 'laser'"),
         (
-            {"spot": {"innerConeAngle": 0.5, "outerConeAngle": 0.5}},
+            {"spot": {"innerConeAngle": 0.5, "outerConeAngle": 0.4}},
             r"lights\[0\]\.spot: cone angles must satisfy",
         ),
         ({"spot": {"outerConeAngle": 2}}, r"lights\[0\]\.spot: cone angles must satisfy"),
+        ({"spot": {"outerConeAngle": 0}}, r"lights\[0\]\.spot: cone angles must satisfy"),
         ({"spot": {"innerConeAngle": -0.1}}, r"lights\[0\]\.spot: cone angles must satisfy"),
     ],
 )
 def test_lights_out_of_range_are_refused(triangle, change, message):
     with pytest.raises(InputError, match=message):
         read_scene(with_light(triangle, {"type": "spot", "spot": {}} | change))
+
+
+def test_equal_cone_angles_are_a_hard_edge_with_a_word(triangle):
+    """Blender writes them for a spot without blend."""
+    path = with_light(triangle, {"type": "spot", "spot": {"innerConeAngle": 0.6, "outerConeAngle": 0.6}})
+    scene = read_scene(path)
+    (spot,) = scene.lights
+    assert spot.outer_cone == 0.6
+    # The falloff is a thousandth of the half angle: what the renderer needs to divide by.
+    assert 0.0 < 0.6 - spot.inner_cone < 0.002 * 0.6
+    assert scene.warnings == ("1 spot has equal cone angles; it has a hard edge",)
 
 
 def test_range_is_left_aside_aloud(triangle):

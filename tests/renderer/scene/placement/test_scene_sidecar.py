@@ -11,7 +11,8 @@ from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.placement import resolve_camera_and_lights
 from vpltune.renderer.scene.placement.free_space import free_space
-from vpltune.renderer.scene.placement.scene_sidecar import read_sidecar, sidecar_path
+from vpltune.renderer.scene.placement.scene_sidecar import read_sidecar
+from vpltune.renderer.scene.placement.sidecar_file import near_miss, sidecar_path, sidecar_text
 from vpltune.renderer.scene.placement.sight import lit_fraction, seen_by
 from vpltune.renderer.scene.scene import Light, Scene
 
@@ -68,6 +69,9 @@ def test_point_and_directional(tmp_path):
         ("[camera]\neye = [0, 0, 0]\nlook_at = [0, 0, 1]\nfov = 3\n", r"\[camera\]: unknown key 'fov'"),
         ("[camra]\n", "unknown key 'camra'"),
         ("[camera\n", "not TOML"),
+        ("a=" + "[" * 100_000, "not a sidecar .nested too deep"),
+        ("a=" + "[" * 400 + "]" * 400, "unknown key 'a'|nested too deep"),
+        ("#" * (1 << 20) + "#", "must have at most 1,048,576 bytes"),
         ("camera = 3\n", "must be a table, got int"),
         ("[camera]\neye = [0, 0, 0]\n", "key 'look_at' is missing"),
         (
@@ -83,7 +87,7 @@ def test_point_and_directional(tmp_path):
         (SPOT.replace("[[light]]", "[light]"), r"lights must be written as \[\[light\]\] tables"),
         (SPOT.replace("intensity = 10", "intensity = -1"), "'intensity' must not be negative"),
         (SPOT.replace("intensity = 10", "intensity = inf"), "'intensity' must be 1 or 3 finite numbers"),
-        (SPOT.replace("= 30", "= 70"), r"cone angles must satisfy 0 ≤ inner < outer"),
+        (SPOT.replace("= 30", "= 70"), r"cone angles must satisfy 0 ≤ inner ≤ outer ≤ 90 degrees"),
         (SPOT + "direction = [0, -1, 0]\n", "must have either 'direction' or 'look_at', got both"),
         (SPOT.replace("[0.0, 0.0, 2.0]", "[0.0, 2.0, 0.0]"), "direction must not be zero"),
         (SPOT.replace("spot", "point"), "unknown key 'look_at'"),
@@ -99,8 +103,14 @@ def test_what_cannot_be_used_is_refused_by_name(tmp_path, text, message):
 def test_a_sidecar_that_is_not_text_is_refused(tmp_path):
     path = tmp_path / "room.vpltune.toml"
     path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="not TOML"):
+    with pytest.raises(InputError, match="not UTF-8 text"):
         read_sidecar(path)
+
+
+def test_a_byte_order_mark_is_passed_over(tmp_path):
+    path = tmp_path / "room.vpltune.toml"
+    path.write_text("\ufeff" + CAMERA, encoding="utf-8")
+    assert read_sidecar(path)[0] is not None
 
 
 def test_flags_go_before_sidecar_before_file_before_automatic(tmp_path):
@@ -154,3 +164,56 @@ def test_a_light_of_the_file_that_lights_nothing_in_sight_is_replaced_and_that_i
 def test_a_scene_without_triangles_is_refused(tmp_path):
     with pytest.raises(InputError, match="must have at least one triangle, got none"):
         resolve_camera_and_lights(Scene("empty", (), (), ()), tmp_path / "empty.glb", None, None)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "Room.vpltune.toml",
+        "room.vpltune.tml",
+        "room.glb.vpltune.toml",
+        "room.vpltune",
+        "room.vpltune.toml.txt",
+        "room.vpl.toml",
+        "room.toml",
+        "rom.vpltune.toml",
+        "room.VPLtune.toml",
+    ],
+)
+def test_a_near_miss_of_the_sidecars_name_is_said(tmp_path, name):
+    scene, view = colored_room(), room_view()
+    (tmp_path / "room.glb").touch()
+    (tmp_path / name).write_text(CAMERA)
+    said = f"{name} is not read: the scene's sidecar would be room.vpltune.toml"
+    assert said in resolve_camera_and_lights(scene, tmp_path / "room.glb", None, None)[2]
+    assert resolve_camera_and_lights(scene, tmp_path / "room.glb", view.camera, view.lights)[2] == ()
+    written(tmp_path, CAMERA + SPOT)
+    assert said not in resolve_camera_and_lights(scene, tmp_path / "room.glb", None, None)[2]
+
+
+@pytest.mark.parametrize(
+    "name", ["rooms.vpltune.toml", "room.vpltune.json", "room.vpltune.glb", "pyproject.toml", "tuned.json"]
+)
+def test_other_files_beside_a_scene_are_no_near_misses(tmp_path, name):
+    """rooms.vpltune.toml is the sidecar of rooms.obj."""
+    for file in ("room.glb", "rooms.obj", name):
+        (tmp_path / file).touch()
+    assert near_miss(tmp_path / "room.glb") is None
+
+
+def test_what_is_written_reads_back(tmp_path):
+    camera, lights = read_sidecar(
+        written(tmp_path, CAMERA + SPOT + '[[light]]\ntype = "point"\nposition = [1, 2, 3]\nintensity = 4\n')
+    )
+    path = tmp_path / "again.vpltune.toml"
+    path.write_text(sidecar_text(camera, lights), encoding="utf-8")
+    again, lights_again = read_sidecar(path)
+    # Seven digits of the eye and the target, which stand a few units apart.
+    np.testing.assert_allclose(again.to_world, camera.to_world, atol=1e-5)
+    assert again.yfov == pytest.approx(camera.yfov, rel=1e-6)
+    for one, other in zip(lights, lights_again, strict=True):
+        assert one.kind == other.kind
+        np.testing.assert_allclose(one.position_world, other.position_world, atol=1e-5)
+        np.testing.assert_allclose(one.direction_world, other.direction_world, atol=1e-6)
+        np.testing.assert_allclose(one.intensity, other.intensity, rtol=1e-6)
+        assert (one.inner_cone, one.outer_cone) == pytest.approx((other.inner_cone, other.outer_cone), 1e-6)

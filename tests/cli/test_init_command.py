@@ -1,0 +1,52 @@
+"""`vpltune init`: the sidecar holds what would be chosen without it, and is not overwritten unasked."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+
+from vpltune.cli.program import run
+from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.placement import resolve_camera_and_lights
+from vpltune.renderer.scene.placement.scene_sidecar import read_sidecar
+
+TRIANGLES = "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nv 0 1 0\nf 1 4 3 2\nf 1 2 5\n"
+GALLERY = Path(__file__).resolve().parents[2] / "configs" / "scenes" / "gallery.glb"
+
+
+def check_written(scene_path):
+    scene = read_scene(scene_path)
+    camera, lights, _ = resolve_camera_and_lights(scene, scene_path, None, None)
+    assert run(["init", str(scene_path)]) == 0
+    own_camera, own_lights = read_sidecar(scene_path.with_suffix(".vpltune.toml"))
+    # Seven digits are written.
+    np.testing.assert_allclose(own_camera.to_world, camera.to_world, atol=1e-4)
+    assert [light.kind for light in own_lights] == [light.kind for light in lights]
+    for own, light in zip(own_lights, lights, strict=True):
+        np.testing.assert_allclose(own.intensity, light.intensity, rtol=1e-5)
+        if light.kind != "directional":
+            np.testing.assert_allclose(own.position_world, light.position_world, atol=1e-4)
+
+
+def test_an_automatic_choice_is_written(tmp_path, capfd):
+    path = tmp_path / "room.obj"
+    path.write_text(TRIANGLES)
+    check_written(path)
+    assert "chosen automatically" in capfd.readouterr().err
+
+
+def test_the_scenes_own_camera_and_light_are_written(tmp_path):
+    shutil.copy(GALLERY, tmp_path / "gallery.glb")
+    check_written(tmp_path / "gallery.glb")
+
+
+def test_a_sidecar_is_replaced_only_when_asked(tmp_path, capfd):
+    path = tmp_path / "room.obj"
+    path.write_text(TRIANGLES)
+    sidecar = tmp_path / "room.vpltune.toml"
+    sidecar.write_text("mine")
+    assert run(["init", str(path)]) == 2
+    assert capfd.readouterr().err.endswith("room.vpltune.toml: exists already; --force replaces it\n")
+    assert sidecar.read_text() == "mine"
+    assert run(["init", str(path), "--force"]) == 0
+    assert sidecar.read_text().startswith("#")

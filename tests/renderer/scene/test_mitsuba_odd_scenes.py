@@ -1,0 +1,161 @@
+"""Mitsuba scenes large for their size, or with one odd part: the rest comes over, with a word."""
+
+import math
+import time
+
+import pytest
+from reading_cost import MITSUBA, check_cost
+
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.scene.files.limits import MAX_INSTANCES
+from vpltune.renderer.scene.mitsuba_import import read_mitsuba
+
+CUBE = '<shape type="cube"/>'
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+LINE = "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"
+OBJ = '<shape type="obj"><string name="filename" value="{}"/></shape>'
+
+
+def read(folder, body):
+    path = folder / "scene.xml"
+    path.write_text(f'<scene version="3.0.0">{body}</scene>')
+    return read_mitsuba(path)
+
+
+def nested_defaults(times, levels):
+    defaults = f'<default name="a0" value="{"x" * 100}"/>'
+    for level in range(1, levels):
+        defaults += f'<default name="a{level}" value="{f"$a{level - 1} " * times}"/>'
+    return f'<scene>{defaults}<shape type="cube"><string name="z" value="$a{levels - 1}"/></shape></scene>'
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (nested_defaults(20, 8), "must have at most 65,536 characters"),
+        # Each value is short enough, and there are many.
+        (
+            '<scene><default name="a" value="' + "x" * 60_000 + '"/>'
+            '<shape type="cube">' + '<string name="z" value="$a"/>' * 100_000 + "</shape></scene>",
+            "and all together 16,777,216",
+        ),
+        ("<scene>" + CUBE * (MAX_INSTANCES + 1) + "</scene>", "a scene must have at most 10,000 shapes"),
+        (
+            f'<scene><shape type="shapegroup" id="g">{CUBE * 200}</shape>'
+            + '<shape type="instance"><ref id="g"/></shape>' * 200
+            + "</scene>",
+            "must place at most 10,000 shapes",
+        ),
+        ("<scene>" + "<a/>" * 600_000, "must have at most 500,000 elements"),
+        ("<scene>" + '<string name="b" value="c"/>' * 499_000 + "</scene>", "has no triangles"),
+        ('<scene><path value="."/>' + '<path value="."/>' * 32 + "</scene>", "at most 32 search paths"),
+    ],
+    ids=["nested", "many", "shapes", "instances", "elements", "values", "paths"],
+)
+def test_a_small_file_costs_little(tmp_path, text, message):
+    path = tmp_path / "scene.xml"
+    path.write_text(text)
+    assert message in check_cost(path, MITSUBA)
+
+
+def test_a_default_is_put_in_once_and_whole(tmp_path):
+    """$wide is not $w followed by ide."""
+    scene = read(
+        tmp_path,
+        '<default name="w" value="1"/><default name="wide" value="2"/>'
+        '<shape type="sphere"><float name="radius" value="$wide"/></shape>',
+    )
+    assert scene.bounds()[1][0] == pytest.approx(2.0, rel=1e-3)  # a polygon of 80 sides
+
+
+@pytest.mark.parametrize("row", ["5 6 7 0", "0 0 0 2", "0 0 1 1", "0 0 0 1_0"])
+def test_a_matrix_must_be_affine(tmp_path, row):
+    matrix = f'<transform name="to_world"><matrix value="1 0 0 0 0 1 0 0 0 0 1 0 {row}"/></transform>'
+    with pytest.raises(InputError, match="the last row must be 0 0 0 1|must be 16 finite numbers"):
+        read(tmp_path, f'<shape type="cube">{matrix}</shape>')
+
+
+def test_files_are_looked_for_in_search_paths_from_the_last_to_the_first(tmp_path):
+    for folder, height in (("one", 1), ("two", 2), (".", 3)):
+        (tmp_path / folder).mkdir(exist_ok=True)
+        (tmp_path / folder / "a.obj").write_text(TRIANGLE.replace("v 0 1 0", f"v 0 {height} 0"))
+    (tmp_path / "b.obj").write_text(TRIANGLE)
+    paths = '<path value="one"/><default name="last" value="two"/><path value="$last"/>'
+    scene = read(tmp_path, OBJ.format("a.obj") + paths + OBJ.format("b.obj"))
+    assert scene.meshes[0].positions[:, 1].max() == 2.0
+    assert len(scene.meshes) == 2
+
+
+def test_search_paths_that_lead_nowhere_or_out_are_said(tmp_path):
+    inside = tmp_path / "in"
+    inside.mkdir()
+    (tmp_path / "secret.obj").write_text(TRIANGLE)
+    scene = read(inside, '<path value=".."/><path value="none"/>' + CUBE)
+    assert scene.warnings[:2] == (
+        "search path '..' is not inside the scene's folder; it is passed over",
+        "search path 'none' is not a folder; it is passed over",
+    )
+    with pytest.raises(InputError, match=r"'secret\.obj' does not exist"):
+        read(inside, '<path value=".."/>' + OBJ.format("secret.obj"))
+
+
+def test_a_path_belongs_to_the_scene(tmp_path):
+    with pytest.raises(InputError, match="<path>"):
+        read(tmp_path, '<shape type="cube"><path value="."/></shape>')
+
+
+def test_meshes_without_area_are_left_out_together(tmp_path):
+    (tmp_path / "line.obj").write_text(LINE)
+    scene = read(tmp_path, CUBE + OBJ.format("line.obj") * 20)
+    assert len(scene.instances) == 1
+    assert "20 shapes have no triangle with area; they are left out" in scene.warnings
+
+
+def test_an_absent_environment_is_said(tmp_path):
+    scene = read(
+        tmp_path, CUBE + '<emitter type="envmap"><string name="filename" value="gone.exr"/></emitter>'
+    )
+    assert scene.warnings[0].startswith("the environment 'gone.exr' is ignored: ")
+
+
+@pytest.mark.parametrize(
+    ("beam", "cutoff", "degrees", "said"),
+    [
+        (30, 30, 30.0, "1 spot has a hard edge"),
+        (100, 120, 90.0, "1 spot shines wider than 90° from its axis; it ends there"),
+        (60, 120, 90.0, "1 spot shines wider than 90° from its axis; it ends there"),
+    ],
+)
+def test_hard_and_wide_spots_come_over_with_a_word(tmp_path, beam, cutoff, degrees, said):
+    spot = f'<emitter type="spot"><float name="beam_width" value="{beam}"/>'
+    spot += f'<float name="cutoff_angle" value="{cutoff}"/></emitter>'
+    scene = read(tmp_path, CUBE + spot)
+    (light,) = scene.lights
+    assert light.outer_cone == pytest.approx(math.radians(degrees))
+    # A thousandth of the half angle is left of a hard edge, for the renderer to divide by.
+    expected = min(beam, 0.999 * degrees)
+    assert light.inner_cone == pytest.approx(math.radians(expected), rel=1e-6)
+    assert said in scene.warnings
+
+
+def test_a_beam_wider_than_its_cutoff_is_refused(tmp_path):
+    spot = '<emitter type="spot"><float name="beam_width" value="40"/></emitter>'
+    with pytest.raises(InputError, match="beam_width ≤ cutoff_angle ≤ 180 degrees, got 40 and 20"):
+        read(tmp_path, CUBE + spot)
+
+
+@pytest.mark.parametrize(("metallic", "is_said"), [("0", False), ("0.8", True)])
+def test_a_metallic_material_is_said(tmp_path, metallic, is_said):
+    bsdf = f'<bsdf type="principled"><float name="metallic" value="{metallic}"/></bsdf>'
+    scene = read(tmp_path, f'<shape type="cube">{bsdf}</shape>')
+    assert ("1 principled material is metallic, which is drawn as matt" in scene.warnings) is is_said
+
+
+def test_references_nested_too_deep_are_refused_in_bounded_time(tmp_path):
+    chain = '<bsdf type="diffuse" id="m0"/>'
+    chain += "".join(f'<bsdf type="twosided" id="m{i + 1}"><ref id="m{i}"/></bsdf>' for i in range(5_000))
+    start = time.process_time()
+    with pytest.raises(InputError, match="references are nested too deep"):
+        read(tmp_path, chain + '<shape type="cube"><ref id="m5000"/></shape>')
+    # Generous: checked annotations take most of it.
+    assert time.process_time() - start < 20.0

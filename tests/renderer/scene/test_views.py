@@ -1,0 +1,62 @@
+"""views.json: what is read back, and what is refused with one line."""
+
+import json
+import math
+
+import pytest
+
+from vpltune.renderer.errors import InputError
+from vpltune.renderer.scene.views import read_views
+
+VIEW = {
+    "name": "a",
+    "split": "fitted",
+    "size": [8, 6],
+    "camera": {"to_world": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 3, 0, 0, 0, 1], "yfov": 0.8},
+    "lights": [
+        {
+            "type": "spot",
+            "intensity": [1, 1, 1],
+            "position": [0, 2, 0],
+            "direction": [0, -1, 0],
+            "inner_cone": 0.5,
+            "outer_cone": 0.5,
+        }
+    ],
+}
+
+
+def written(folder, text):
+    path = folder / "views.json"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def test_a_byte_order_mark_and_a_hard_edge_are_read(tmp_path):
+    (view,) = read_views(written(tmp_path, b"\xef\xbb\xbf" + json.dumps({"views": [VIEW]}).encode()))
+    light = view.lights[0]
+    assert light.outer_cone == 0.5
+    assert 0.0 < 0.5 - light.inner_cone < 0.001
+    assert math.isclose(view.camera.yfov, 0.8)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[" * 100_000, "nested too deep"),
+        (json.dumps({"views": [VIEW]}).replace("[8, 6]", "[" * 900 + "]" * 900), "size: must be|nested too"),
+        ("{", "not JSON"),
+        (b"\xff\xfe\x00", "not UTF-8 text"),
+        ('{"views": ' + "1" * 5000 + "}", "not JSON"),
+        (json.dumps({"views": [VIEW]}).replace("[8, 6]", "[" + "9" * 4000 + ", 6]"), "size: must be"),
+        (json.dumps({"views": [VIEW]}).replace("0.8", "1e999"), "yfov: must be 1 finite number"),
+        (json.dumps({"views": [{**VIEW, "camera": []}]}), "must be an object, got list"),
+        (json.dumps({"views": []}), "key 'views' must be a list of at least one view"),
+        (" " * ((1 << 24) + 1), "must have at most 16,777,216 bytes"),
+    ],
+)
+def test_broken_files_are_refused_with_one_line(tmp_path, text, message):
+    path = written(tmp_path, text)
+    with pytest.raises(InputError, match=message) as refused:
+        read_views(path)
+    assert str(refused.value).startswith(str(path)) and "\n" not in str(refused.value)

@@ -1,0 +1,62 @@
+"""What reading a scene costs in processor time and memory, in a process of its own."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+_READ = """
+import json, resource, sys, time
+from vpltune.renderer.errors import InputError
+{setup}
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+start = time.process_time()
+try:
+    {read}
+    message = ""
+except InputError as refused:
+    message = str(refused)
+seconds = time.process_time() - start
+grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+print(json.dumps([message, seconds, grown * 1024]))
+"""
+SCENE = ("from vpltune.renderer.scene.files import read_scene", "read_scene(sys.argv[1])")
+"""How `read_scene` is loaded and called."""
+MITSUBA = ("from vpltune.renderer.scene.mitsuba_import import read_mitsuba", "read_mitsuba(sys.argv[1])")
+"""How a Mitsuba scene is read."""
+BATCH = (
+    "from pathlib import Path; from vpltune.tuner.batch.referred_files import referred_files",
+    "referred_files(Path(sys.argv[1]))",
+)
+"""What a batch reads of a scene before it starts the fit with its limits."""
+
+IMAGES = (
+    "from pathlib import Path; from vpltune.tuner.evaluation.view_images import read_view_images",
+    "read_view_images(Path(sys.argv[1]))",
+)
+"""How a report reads a fit's images."""
+
+
+def check_cost(path: Path, how: tuple[str, str] = SCENE) -> str:
+    """Read a file and hold the cost to the documented bound: 1 GiB, and 2 s with 3 µs for each byte.
+
+    Args:
+        path: the file; files beside it with the same stem count too.
+        how: what to load and what to call.
+
+    Returns:
+        The message if the file is refused, else nothing.
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", _READ.format(setup=how[0], read=how[1]), str(path)],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=300,
+    )
+    message, seconds, grown = json.loads(done.stdout)
+    size = sum(file.stat().st_size for file in path.parent.glob(f"{path.stem}.*"))
+    assert seconds < 2.0 + 3e-6 * size, f"{seconds:.1f} s for {size} bytes"
+    assert grown < 1 << 30, f"{grown >> 20} MiB for {size} bytes"
+    assert "\n" not in message
+    return message

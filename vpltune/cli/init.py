@@ -1,0 +1,34 @@
+"""`vpltune init`: writes a scene's sidecar with the camera and the lights that would be used."""
+
+from typing import Annotated
+
+import typer
+
+from vpltune.cli.options import JsonOption, SceneArgument
+from vpltune.cli.report import Report, warn
+from vpltune.renderer.errors import InputError
+
+
+def init(
+    scene: SceneArgument,
+    force: Annotated[bool, typer.Option("--force", help="Replace a sidecar that exists.")] = False,
+    json: JsonOption = False,
+) -> Report:
+    """Write SCENE.vpltune.toml to be edited: the scene's camera and lights, or automatic ones."""
+    from rich.markup import escape
+
+    from vpltune.renderer.files.atomic_file import write_text_whole
+    from vpltune.renderer.scene.files import read_scene
+    from vpltune.renderer.scene.placement.scene_sidecar import completed_camera_and_lights
+    from vpltune.renderer.scene.placement.sidecar_file import sidecar_path, sidecar_text
+
+    path = sidecar_path(scene)
+    if path.exists() and not force:
+        raise InputError(f"{path}: exists already; --force replaces it")
+    loaded = read_scene(scene)
+    warn(loaded.warnings)
+    camera, lights, notes = completed_camera_and_lights(loaded, scene, None, None)
+    warn(notes)
+    write_text_whole(path, sidecar_text(camera, lights))
+    document = {"scene": str(scene), "sidecar": str(path), "lights": len(lights), "status": "ok"}
+    return Report(document, (f"wrote {escape(str(path))} (camera, {len(lights)} lights)",))

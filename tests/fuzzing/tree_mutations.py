@@ -1,0 +1,105 @@
+"""Mutations of a document's tree: dicts, lists and values, as JSON and TOML have them."""
+
+import copy
+import random
+from typing import Any
+
+from tests.fuzzing.extremes import NUMBERS, STRINGS, SecondKey, extreme
+
+LONGEST_LIST = 20_000
+"""A choice: members of a repeated list. A quadratic reader takes seconds for them, a linear one does not."""
+
+
+def mutate_tree(tree: dict[Any, Any], rng: random.Random) -> None:
+    """Change one to five places of `tree`, mostly one or two."""
+    for _ in range(min(1 + int(rng.expovariate(1.2)), 5)):
+        places = _places(tree)
+        if not places:
+            return
+        container, key = rng.choice(places)
+        rng.choices(_MUTATIONS, _WEIGHTS)[0](container, key, places, rng)
+
+
+def _places(tree: dict[Any, Any]) -> list[tuple[Any, Any]]:
+    found: list[tuple[Any, Any]] = []
+    left: list[Any] = [tree]
+    while left and len(found) < 5000:
+        container = left.pop()
+        keys = container if isinstance(container, dict) else range(len(container))
+        for key in keys:
+            found.append((container, key))
+            if isinstance(container[key], dict | list):
+                left.append(container[key])
+    return found
+
+
+def _replace(container: Any, key: Any, places: list[tuple[Any, Any]], rng: random.Random) -> None:
+    container[key] = extreme(rng)
+
+
+def _change_alike(container: Any, key: Any, places: list[tuple[Any, Any]], rng: random.Random) -> None:
+    """Another value of the same type, which gets further than one of another type."""
+    value = container[key]
+    if isinstance(value, bool):
+        container[key] = not value
+    elif isinstance(value, int | float):
+        near = (value + 1, value - 1, -value, value * 10, value * 1000, value / 2, float(value))
+        container[key] = rng.choice(near) if rng.random() < 0.5 else rng.choice(NUMBERS)
+    elif isinstance(value, str):
+        texts = [each[name] for each, name in places if isinstance(each[name], str)]
+        container[key] = rng.choice(STRINGS) if rng.random() < 0.5 else rng.choice(texts)
+    elif isinstance(value, list):
+        rng.shuffle(value)
+    else:
+        container[key] = {}
+
+
+def _delete(container: Any, key: Any, places: list[tuple[Any, Any]], rng: random.Random) -> None:
+    del container[key]
+
+
+def _double_key(container: Any, key: Any, places: list[tuple[Any, Any]], rng: random.Random) -> None:
+    if isinstance(container, dict) and isinstance(key, str):
+        container[SecondKey(key)] = extreme(rng) if rng.random() < 0.5 else container[key]
+    else:
+        _repeat(container, key, places, rng)
+
+
+def _rename_key(container: Any, key: Any, places: list[tuple[Any, Any]], rng: random.Random) -> None:
+    if isinstance(container, dict):
+        names = [name for each, name in places if isinstance(each, dict) and isinstance(name, str)]
+        container[rng.choice(STRINGS) if rng.random() < 0.3 else rng.choice(names)] = container.pop(key)
+    else:
+        _replace(container, key, places, rng)
+
+
+def _splice(container: Any, key: Any, places: list[tuple[Any, Any]], rng: random.Random) -> None:
+    """What stands at another place, whole."""
+    source, name = rng.choice(places)
+    container[key] = copy.deepcopy(source[name])
+
+
+def _repeat(container: Any, key: Any, places: list[tuple[Any, Any]], rng: random.Random) -> None:
+    value = container[key]
+    times = 2 ** rng.choice((1, 1, 1, 2, 3, 6, 10, 14))
+    if isinstance(value, list) and value:
+        # The copies are one object: it is only written. A later mutation may change all of them.
+        container[key] = value * max(min(times, LONGEST_LIST // len(value)), 1)
+    elif isinstance(value, str):
+        container[key] = value * min(times, 1000)
+    elif isinstance(container, list) and len(container) < LONGEST_LIST:
+        container[key:key] = [value] * min(times, LONGEST_LIST)
+    else:
+        container[key] = [value, value]
+
+
+def _shorten(container: Any, key: Any, places: list[tuple[Any, Any]], rng: random.Random) -> None:
+    value = container[key]
+    if isinstance(value, list | str) and value:
+        container[key] = value[: rng.randrange(len(value))]
+    else:
+        del container[key]
+
+
+_MUTATIONS = (_replace, _change_alike, _delete, _double_key, _rename_key, _splice, _repeat, _shorten)
+_WEIGHTS = (20, 40, 10, 2, 4, 12, 8, 6)

@@ -93,6 +93,9 @@ STRINGS: tuple[str, ...] = (
 )
 """Texts that are no Unicode, no path, no number or part of a format's own grammar."""
 
+LONGEST_TEXT = 1 << 21
+"""A choice: characters that a repeated part of a document may come to, so that cases are made in no time."""
+
 DEPTHS = (10, 63, 64, 65, 300, 990, 1100, 5000, 100_000)
 """Depths of nesting around the limits of readers and of Python's own recursion."""
 

@@ -14,7 +14,7 @@ import OpenEXR
 from PIL import Image
 
 from tests.fuzzing.byte_mutations import mutate_bytes
-from tests.fuzzing.extremes import DEPTHS, STRINGS, number_text
+from tests.fuzzing.extremes import DEPTHS, LONGEST_TEXT, STRINGS, number_text
 from tests.fuzzing.gltf_cases import SHARE_LARGE
 
 _XML = """<scene version="3.0.0">
@@ -183,7 +183,8 @@ def _mutate(root: Element, rng: random.Random) -> None:
             case 6:
                 parent.children.pop(at)
             case 7:
-                parent.children[at:at] = [node] * 2 ** rng.choice((0, 0, 2, 5, 8))
+                times = 2 ** rng.choice((0, 0, 2, 5, 8))
+                parent.children[at:at] = [node] * min(times, LONGEST_TEXT // len(node.text()))
             case 8 | 9:
                 source, index = rng.choice(places)
                 parent.children[at] = source.children[index].copy()

@@ -7,7 +7,7 @@ from pathlib import Path
 from PIL import Image
 
 from tests.fuzzing.byte_mutations import mutate_bytes
-from tests.fuzzing.extremes import STRINGS, number_text
+from tests.fuzzing.extremes import LONGEST_TEXT, STRINGS, number_text
 from tests.fuzzing.gltf_cases import SHARE_LARGE
 from tests.fuzzing.large_documents import large_obj
 
@@ -118,15 +118,19 @@ def mutated_lines(text: str, rng: random.Random, words: tuple[str, ...]) -> byte
             case 5:
                 line[place:place] = [rng.choice(words)]
             case 6:
-                line[place:] = line[place:] * 2 ** rng.choice((1, 1, 3, 8, 13))
+                line[place:] *= _times(line[place:], rng)
             case 7:
-                lines[at:at] = [list(line)] * 2 ** rng.choice((0, 0, 3, 8, 13))
+                lines[at:at] = [list(line) for _ in range(_times(line, rng))]
             case 8:
                 lines.pop(at)
             case _:
                 lines.insert(rng.randrange(len(lines)), lines.pop(at))
     ending = rng.choice(("\n",) * 6 + ("\r\n", "\r", " \\\n", "\n\n"))
     return ending.join(" ".join(line) for line in lines).encode("utf-8", "surrogatepass") + ending.encode()
+
+
+def _times(words: list[str], rng: random.Random) -> int:
+    return min(2 ** rng.choice((1, 1, 3, 8, 13)), LONGEST_TEXT // (len(" ".join(words)) + 1))
 
 
 def _word(word: str, rng: random.Random) -> str:

@@ -35,11 +35,14 @@ class Findings:
     kinds: dict[tuple[str, str], list[tuple[Case, Outcome]]] = field(default_factory=dict)
     """Findings by reader and kind."""
 
-    def add(self, case: Case, outcome: Outcome) -> None:
-        """Count a case."""
+    def add(self, case: Case, outcome: Outcome) -> bool:
+        """Count a case; whether it is a finding of a new kind."""
         self.verdicts[case.reader, outcome.verdict] += 1
-        if outcome.verdict == "finding":
-            self.kinds.setdefault((case.reader, outcome.kind), []).append((case, outcome))
+        if outcome.verdict != "finding":
+            return False
+        alike = self.kinds.setdefault((case.reader, outcome.kind), [])
+        alike.append((case, outcome))
+        return len(alike) == 1
 
     def lines(self) -> list[str]:
         """A table of the verdicts, then the findings by kind, each with its first case."""
@@ -59,6 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _options(arguments)
     _warm_up()
     if options.keep is not None:
+        options.keep.mkdir(parents=True, exist_ok=True)
         path, mutated = options.case[0].write(options.keep)
         print(f"{path}: {'changed' if mutated else 'valid as it is'}")
     named = (
@@ -119,7 +123,8 @@ def _run(named: list[Case], findings: Findings) -> bool:
     shown = outcomes(named, Limits())
     try:
         for done, (case, outcome) in enumerate(shown, 1):
-            findings.add(case, outcome)
+            if findings.add(case, outcome):
+                _tell_new(case, outcome)
             now = time.monotonic()
             if now - told >= (1.0 if sys.stderr.isatty() else 30.0):
                 told = now
@@ -132,6 +137,11 @@ def _run(named: list[Case], findings: Findings) -> bool:
         if sys.stderr.isatty():
             print(file=sys.stderr)
     return False
+
+
+def _tell_new(case: Case, outcome: Outcome) -> None:
+    start = "\r" if sys.stderr.isatty() else ""
+    print(f"{start}{case}: {outcome.kind}", file=sys.stderr, flush=True)
 
 
 def _tell(line: str) -> None:

@@ -4,7 +4,8 @@ import copy
 import random
 from typing import Any
 
-from tests.fuzzing.extremes import NUMBERS, STRINGS, SecondKey, extreme
+from tests.fuzzing.extremes import LONGEST_TEXT, NUMBERS, STRINGS, SecondKey, extreme
+from tests.fuzzing.tree_text import json_text
 
 LONGEST_LIST = 20_000
 """A choice: members of a repeated list. A quadratic reader takes seconds for them, a linear one does not."""
@@ -81,14 +82,15 @@ def _splice(container: Any, key: Any, places: list[tuple[Any, Any]], rng: random
 
 def _repeat(container: Any, key: Any, places: list[tuple[Any, Any]], rng: random.Random) -> None:
     value = container[key]
-    times = 2 ** rng.choice((1, 1, 1, 2, 3, 6, 10, 14))
+    times = min(2 ** rng.choice((1, 1, 1, 2, 3, 6, 10, 14)), LONGEST_TEXT // len(json_text(value) + " "))
     if isinstance(value, list) and value:
-        # The copies are one object: it is only written. A later mutation may change all of them.
-        container[key] = value * max(min(times, LONGEST_LIST // len(value)), 1)
+        # Copies of their own: one object in many places would take a later change in all of them.
+        count = max(min(times, LONGEST_LIST // len(value)), 1)
+        container[key] = [copy.deepcopy(each) for _ in range(count) for each in value]
     elif isinstance(value, str):
-        container[key] = value * min(times, 1000)
+        container[key] = value * times
     elif isinstance(container, list) and len(container) < LONGEST_LIST:
-        container[key:key] = [value] * min(times, LONGEST_LIST)
+        container[key:key] = [copy.deepcopy(value) for _ in range(min(times, LONGEST_LIST))]
     else:
         container[key] = [value, value]
 

@@ -43,7 +43,7 @@ def grow_gltf(seed: GltfSeed, rng: random.Random) -> None:
                 animation["channels"] *= count
             document["nodes"] += [{"name": "x" * 20}] * count
         case 7:  # many corners, in one primitive
-            corners = bytes(range(len(seed.positions))) * (100 * count // len(seed.positions))
+            corners = bytes(range(len(seed.positions))) * (30 * count // len(seed.positions))
             corners = corners[: len(corners) // 3 * 3]
             accessor: dict[str, Any] = {"componentType": 5121, "count": len(corners), "type": "SCALAR"}
             primitive["indices"] = seed.add("accessors", accessor | {"bufferView": seed.view(corners)})

@@ -93,6 +93,24 @@ STRINGS: tuple[str, ...] = (
 )
 """Texts that are no Unicode, no path, no number or part of a format's own grammar."""
 
+ODD_CHARACTERS = (
+    "\ud800",
+    "\udfff",
+    "\0",
+    "\n",
+    "\u2028",
+    "\x1b",
+    "💡",
+    "/",
+    "\\",
+    "%",
+    "%00",
+    "'",
+    '"',
+    " ",
+)
+"""Characters that make a valid name, path or number one that is not, or that is hard to print."""
+
 LONGEST_TEXT = 1 << 21
 """A choice: characters that a repeated part of a document may come to, so that cases are made in no time."""
 

@@ -184,7 +184,8 @@ def _mutate(root: Element, rng: random.Random) -> None:
                 parent.children.pop(at)
             case 7:
                 times = 2 ** rng.choice((0, 0, 2, 5, 8))
-                parent.children[at:at] = [node] * min(times, LONGEST_TEXT // len(node.text()))
+                times = min(times, LONGEST_TEXT // len(node.text()))
+                parent.children[at:at] = [node.copy() for _ in range(times)]
             case 8 | 9:
                 source, index = rng.choice(places)
                 parent.children[at] = source.children[index].copy()
@@ -233,7 +234,8 @@ def _change_attribute(node: Element, places: list[tuple[Element, int]], rng: ran
 def _wrap(parent: Element, at: int, rng: random.Random) -> None:
     """Put an element into many like it."""
     node = parent.children[at]
-    for _ in range(min(rng.choice(DEPTHS), 1100)):
+    most = LONGEST_TEXT // len(Element(node.tag, node.attributes).text())
+    for _ in range(min(rng.choice(DEPTHS), 1100, most)):
         node = Element(node.tag, dict(node.attributes), [node])
     parent.children[at] = node
 

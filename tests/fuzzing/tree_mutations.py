@@ -4,7 +4,7 @@ import copy
 import random
 from typing import Any
 
-from tests.fuzzing.extremes import LONGEST_TEXT, NUMBERS, STRINGS, SecondKey, extreme
+from tests.fuzzing.extremes import LONGEST_TEXT, NUMBERS, ODD_CHARACTERS, STRINGS, SecondKey, extreme
 from tests.fuzzing.tree_text import json_text
 
 LONGEST_LIST = 20_000
@@ -17,20 +17,27 @@ def mutate_tree(tree: dict[Any, Any], rng: random.Random) -> None:
         places = _places(tree)
         if not places:
             return
-        container, key = rng.choice(places)
+        # By name first: else the numbers of matrices and long lists would be chosen before all else.
+        names: dict[str, list[tuple[Any, Any]]] = {}
+        for container, key, name in places:
+            names.setdefault(name, []).append((container, key))
+        container, key = rng.choice(names[rng.choice(list(names))])
+        places = [(each, at) for each, at, _ in places]
         rng.choices(_MUTATIONS, _WEIGHTS)[0](container, key, places, rng)
 
 
-def _places(tree: dict[Any, Any]) -> list[tuple[Any, Any]]:
-    found: list[tuple[Any, Any]] = []
-    left: list[Any] = [tree]
+def _places(tree: dict[Any, Any]) -> list[tuple[Any, Any, str]]:
+    """Container, key, and name: the key, or for members of a list the list's own and a star."""
+    found: list[tuple[Any, Any, str]] = []
+    left: list[tuple[Any, str]] = [(tree, "")]
     while left and len(found) < 5000:
-        container = left.pop()
+        container, of = left.pop()
         keys = container if isinstance(container, dict) else range(len(container))
         for key in keys:
-            found.append((container, key))
+            name = key if isinstance(key, str) else f"{of}*"
+            found.append((container, key, name))
             if isinstance(container[key], dict | list):
-                left.append(container[key])
+                left.append((container[key], name))
     return found
 
 
@@ -48,7 +55,9 @@ def _change_alike(container: Any, key: Any, places: list[tuple[Any, Any]], rng: 
         container[key] = rng.choice(near) if rng.random() < 0.5 else rng.choice(NUMBERS)
     elif isinstance(value, str):
         texts = [each[name] for each, name in places if isinstance(each[name], str)]
-        container[key] = rng.choice(STRINGS) if rng.random() < 0.5 else rng.choice(texts)
+        at = rng.randrange(len(value) + 1)
+        odd = value[:at] + rng.choice(ODD_CHARACTERS) + value[at:]
+        container[key] = rng.choice((rng.choice(STRINGS), rng.choice(texts), odd))
     elif isinstance(value, list):
         rng.shuffle(value)
     else:

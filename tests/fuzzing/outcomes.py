@@ -83,7 +83,7 @@ def place_of(frames: list[tuple[str, int]]) -> str:
 
 def is_ours(file: str) -> bool:
     """Whether a file is part of the code that is fuzzed."""
-    return file.startswith(str(REPOSITORY)) and _from_repository(file).parts[0] in _CODE
+    return Path(file).is_relative_to(REPOSITORY) and _from_repository(file).parts[0] in _CODE
 
 
 def _from_repository(file: str) -> Path:

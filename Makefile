@@ -12,7 +12,7 @@ WORKERS ?= 2
 PYTHONS ?= 3.11 3.12 3.13
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all test-pythons bench figures lint docs clean requirements schema
+.PHONY: help setup demo test test-all test-pythons bench figures fuzz lint docs clean requirements schema
 .DELETE_ON_ERROR:
 
 help: ## list the targets
@@ -38,6 +38,10 @@ bench: setup ## the benchmarks
 # Hours; goes on where it was. ONLY=name runs one command of docs/figures.toml.
 figures: setup ## run every command that a figure in a document names, and say which figures changed
 	@$(BIN)/python scripts/figures.py $(if $(ONLY),--only $(ONLY))
+
+# Minutes. Ctrl-C prints what was found, and FIRST with which the next run goes on.
+fuzz: setup ## read some 50,000 files changed at random; SEED=2 takes others, CASES=1000 fewer
+	@$(BIN)/python -m tests.fuzzing.run --cases $(or $(CASES),50000) --seed $(or $(SEED),1) --first $(or $(FIRST),0)
 
 lint: setup ## style, format, import rules, docstrings, comments and types
 	@$(BIN)/ruff check

@@ -153,7 +153,7 @@ def _view_from_json(entry: Any, where: str) -> View:
 def _light_from_json(entry: Any, where: str) -> Light:
     kind = _member(entry, "type", where)
     if kind not in ("spot", "point", "directional"):
-        raise InputError(f"{where}.type: must be 'spot', 'point' or 'directional', got {kind!r}")
+        raise InputError(f"{where}.type: must be 'spot', 'point' or 'directional', got {kind!r:.60}")
     intensity = _numbers(entry, "intensity", 3, where)
     if (intensity < 0.0).any():
         raise InputError(f"{where}.intensity: must not be negative, got {intensity.tolist()}")

@@ -162,7 +162,7 @@ def _check_keys(table: Any, allowed: tuple[str, ...], where: str) -> None:
         raise InputError(f"{where}: must be a table, got {type(table).__name__}")
     for key in table:
         if key not in allowed:
-            raise InputError(f"{where}: unknown key '{key}'; known are {', '.join(allowed)}")
+            raise InputError(f"{where}: unknown key {key!r:.60}; known are {', '.join(allowed)}")
 
 
 def _numbers(

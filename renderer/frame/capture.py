@@ -1,6 +1,6 @@
 """Reading a drawn frame back into numpy, row 0 at the top, for the tuner, tests and image files."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -86,6 +86,22 @@ class CapturedFrame:
     """None where the config asks for none."""
     scene_length: float
     """L: flux-weighted RMS distance of the lit RSM texels from their centroid."""
+
+
+def in_world_units(captured: CapturedFrame, scale: float) -> CapturedFrame:
+    """The frame of a scene of which `scale` times the lengths were drawn (`renderer.scene.working_scale`)."""
+    if scale == 1.0:
+        return captured
+    length = np.float32(1.0 / scale)
+    return replace(
+        captured,
+        depth=captured.depth * length,
+        position_world=captured.position_world * length,
+        vpl_position_world=captured.vpl_position_world * length,
+        vpl_footprint=captured.vpl_footprint * length,
+        vpl_flux=captured.vpl_flux * length * length,
+        scene_length=captured.scene_length / scale,
+    )
 
 
 def capture_frame(frame: Frame, view: View, *, discs: bool, maps: bool = True) -> CapturedFrame:

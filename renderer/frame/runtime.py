@@ -12,7 +12,7 @@ from jaxtyping import Float32
 from vpltune.renderer.config.artist_parameters import ArtistParameters, placement
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import MachineError
-from vpltune.renderer.frame.capture import CapturedFrame, capture_frame, read_image
+from vpltune.renderer.frame.capture import CapturedFrame, capture_frame, in_world_units, read_image
 from vpltune.renderer.frame.clip_state import ClipState
 from vpltune.renderer.frame.frame import Frame, FrameSetup, frame_light_records
 from vpltune.renderer.frame.frame_pass import FrameInputs
@@ -23,10 +23,11 @@ from vpltune.renderer.gpu.gpu_context import check_errors, create_context, free_
 from vpltune.renderer.gpu.ray_hierarchy import RayHierarchy
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
 from vpltune.renderer.scene.animation import Pose
-from vpltune.renderer.scene.dynamic_lights import DynamicLights
-from vpltune.renderer.scene.scene import Scene
+from vpltune.renderer.scene.dynamic_lights import DynamicLights, scaled_records
+from vpltune.renderer.scene.scene import Scene, scaled
 from vpltune.renderer.scene.sun_faces import nested_face_count
-from vpltune.renderer.scene.views import View
+from vpltune.renderer.scene.views import View, scaled_view
+from vpltune.renderer.scene.working_scale import working_scale
 
 Layer = Literal["final", "direct", "indirect", "irradiance", "albedo", "normal", "depth"]
 LAYERS: tuple[Layer, ...] = get_args(Layer)
@@ -63,9 +64,10 @@ def _on_own_context(method: Callable[..., Any]) -> Callable[..., Any]:
 class DrawnFrame:
     """A frame as it was drawn, still on the GPU; it holds until the runtime draws again."""
 
-    def __init__(self, frame: Frame, inputs: FrameInputs, view: View, config: TunedConfig):
+    def __init__(self, frame: Frame, inputs: FrameInputs, view: View, config: TunedConfig, scale: float):
         self.frame = frame
         self.inputs = inputs
+        self._scale = scale
         self._view = view
         self._config = config
 
@@ -95,7 +97,7 @@ class DrawnFrame:
         discs = self._config.parameters.vpls_are_discs
         captured = capture_frame(self.frame, self._view, discs=discs, maps=maps)
         check_errors(self.context, f"the buffers of view {self._view.name}")
-        return captured
+        return in_world_units(captured, self._scale)
 
     @_on_own_context
     def read_statistics(self) -> Float32[np.ndarray, " statistics"]:
@@ -128,6 +130,8 @@ class Runtime:
         self._context = create_context() if context is None else context
         self.opengl_renderer: str = self._context.info["GL_RENDERER"]
         self._context.__enter__()
+        self._scale = working_scale(scene)
+        scene = scaled(scene, self._scale) if self._scale != 1.0 else scene
         self.scene_buffers = SceneBuffers(self._context, scene)
         self._hierarchy: RayHierarchy | None = None
         self._scene = scene
@@ -142,7 +146,8 @@ class Runtime:
     @_on_own_context
     def pose(self, pose: Pose) -> None:
         """Move the scene; takes effect with the next image."""
-        self.scene_buffers.set_pose(pose.transforms, pose.joint_matrices)
+        grow = np.diag([self._scale, self._scale, self._scale, 1.0])
+        self.scene_buffers.set_pose(grow @ pose.transforms, grow @ pose.joint_matrices)
 
     @_on_own_context
     def render(
@@ -340,7 +345,10 @@ class Runtime:
         frame = self._frame(FrameSetup.of(view, config, self._nested_faces))
         inputs = self._inputs(view, config, state, table_rotation=table_rotation, lights=lights)
         frame.draw(inputs)
-        return DrawnFrame(frame, inputs, view, config)
+        return DrawnFrame(frame, inputs, self._scaled(view), config, self._scale)
+
+    def _scaled(self, view: View) -> View:
+        return view if self._scale == 1.0 else scaled_view(view, self._scale)
 
     def _inputs(
         self,
@@ -352,6 +360,9 @@ class Runtime:
         lights: DynamicLights | None = None,
     ) -> FrameInputs:
         frame = self._frame(FrameSetup.of(view, config, self._nested_faces))
+        view = self._scaled(view)
+        if lights is not None and self._scale != 1.0:
+            lights = DynamicLights(scaled_records(lights.records, self._scale))
         low, high = self.scene_buffers.bounds()
         return FrameInputs(
             camera=frame.camera(view),

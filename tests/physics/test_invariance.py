@@ -49,7 +49,7 @@ def test_mean_irradiance_is_stable(gl_context, light):
     np.testing.assert_allclose(more_pixels, base, rtol=1e-2)
 
 
-@pytest.mark.parametrize("factor", [0.01, 0.1, 10.0, 100.0])
+@pytest.mark.parametrize("factor", [1e-12, 1e-8, 0.01, 0.1, 10.0, 100.0, 1e8, 2e11])
 @pytest.mark.parametrize("light", ROOM_LIGHTS)
 def test_scale_changes_nothing(gl_context, light, factor):
     """Scene, camera and light scaled together give the same image from the same config, to 2e-3.
@@ -64,9 +64,12 @@ def test_scale_changes_nothing(gl_context, light, factor):
     grown = other.render_radiance(scaled_view(view, factor), config)
     error = np.sqrt(np.mean((grown - image) ** 2) / np.mean(image**2))
     assert error < 2e-3
-    assert other.capture(scaled_view(view, factor), config).scene_length == pytest.approx(
-        factor * runtime.capture(view, config).scene_length, rel=1e-3
-    )
+    one, grown = runtime.capture(view, config), other.capture(scaled_view(view, factor), config)
+    assert grown.scene_length == pytest.approx(factor * one.scene_length, rel=1e-3)
+    for name, power in (("position_world", 1), ("depth", 1), ("vpl_footprint", 1), ("vpl_flux", 2)):
+        expected = factor**power * np.abs(getattr(one, name)).mean(dtype=np.float64)
+        found = np.abs(getattr(grown, name)).mean(dtype=np.float64)
+        assert found == pytest.approx(expected, rel=2e-3)
 
 
 def test_no_absolute_length_in_a_shader():

@@ -63,21 +63,13 @@ A photograph has 2 to 10 texels per byte. A file that unpacks a kilobyte to a me
 """
 
 LARGEST_COORDINATE = 1e12
-"""In world units. Measured: at three times this, cubes of lengths overflow float32, and light doubles."""
+"""In world units. A choice: kilometres in millimetres, with six digits to spare."""
 
 LARGEST_NORMAL = 3.4e38
 """Largest component of a normal before it is scaled to unit length: any that float32 can hold."""
 
 SMALLEST_EXTENT = 1e-12
 """Smallest diagonal of a scene in world units. A choice, like the largest coordinate."""
-
-EXACT_EXTENTS = (1e-8, 1e9)
-"""Diagonals of scenes in world units whose indirect light is the same to 1e-3.
-
-Measured with the automatic light, whose intensity grows with the square of lengths. Beyond, indirect light is
-lost by and by: fourth powers of lengths leave the range of float32.
-"""
-
 LARGEST_RADIOMETRIC = 1e18
 """A choice: largest intensity of a light, W/sr or W/m². Times any albedo and area it is finite in float32."""
 

@@ -2,14 +2,13 @@
 
 import importlib
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from vpltune.renderer.errors import InputError, MachineError
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, one_line
-from vpltune.renderer.scene.files.limits import EXACT_EXTENTS, LARGEST_COORDINATE, SMALLEST_EXTENT
+from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, SMALLEST_EXTENT
 from vpltune.renderer.scene.scene import Scene
 
 # Module and function for each suffix. Modules are loaded on demand, so reading an OBJ does not load Draco.
@@ -63,7 +62,7 @@ def _reader_for(path: Path) -> Callable[[Path, Warnings], Scene]:
 
 
 def _checked(scene: Scene) -> Scene:
-    """The scene, with a warning if its size is at the edge of what float32 can hold."""
+    """The scene, which has triangles and a size that can be drawn."""
     if not scene.instances:
         hints = f" ({'; '.join(scene.warnings)})" if scene.warnings else ""
         raise SceneFileError(f"the scene has no triangles{hints}")
@@ -75,11 +74,4 @@ def _checked(scene: Scene) -> Scene:
     extent = float(np.linalg.norm(high - low))
     if not extent >= SMALLEST_EXTENT:
         raise SceneFileError(f"the scene must be at least {SMALLEST_EXTENT:g} across, got {extent:g}")
-    least, most = EXACT_EXTENTS
-    if least <= extent <= most:
-        return scene
-    inexact = (
-        f"the scene is {extent:.2g} units across: indirect light is exact from {least:g} to {most:g}, "
-        "and may be lost beyond; scale the scene"
-    )
-    return replace(scene, warnings=(*scene.warnings, inexact))
+    return scene

@@ -247,10 +247,8 @@ def test_a_large_skin_is_read_in_chunks(gltf, monkeypatch):
     [
         (1e13, r"positions must be finite and at most 1e\+12 in magnitude"),
         (1e-13, r"must be at least 1e-12 across, got 1.4\d*e-13"),
-        (1e11, "indirect light is exact from 1e-08 to 1e\\+09"),
-        (1e-10, "indirect light is exact from 1e-08 to 1e\\+09"),
-        (1e8, None),
-        (1e-7, None),
+        (1e11, None),
+        (1e-10, None),
     ],
 )
 def test_the_range_of_sizes(gltf, size, outcome):

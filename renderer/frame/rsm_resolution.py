@@ -12,12 +12,12 @@ RSM_RESOLUTION_OF_MANY = 512
 FEW_FACES = 2
 """Faces up to which each has the full resolution; those of a sun count as one. A choice: two lamps, or a lamp
 and a sun."""
-MOST_TEXELS = 1 << 26
-"""Texels of all faces, beyond which each has half as many along its side, and so on. A choice: 0.8 GB."""
+MOST_TEXELS = 1 << 25
+"""Texels of all faces, beyond which each has half as many along its side, and so on. A choice: half a GB."""
 LEAST_RESOLUTION = 64
 """Where that ends. A choice: a shadow is still a shadow, and each cell of the importance has some texels."""
 MOST_FACES = MOST_TEXELS // LEAST_RESOLUTION**2
-"""Faces that there is room for: 2,730 point lights."""
+"""Faces that there is room for: 1,365 point lights."""
 
 
 def rsm_resolution(lights: tuple[Light, ...], quality: Quality | None = None) -> int:

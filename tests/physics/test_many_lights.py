@@ -72,5 +72,5 @@ def test_an_atlas_is_about_square_and_within_bounds():
 
 def test_too_many_lights_are_refused_by_name():
     lights = (ROOM_LIGHTS["point"],) * (MOST_FACES // 6 + 1)
-    with pytest.raises(InputError, match=r"at most 16,384 shadow map faces, got 2,731 lights"):
+    with pytest.raises(InputError, match=r"at most 8,192 shadow map faces, got 1,366 lights"):
         rsm_resolution(lights)

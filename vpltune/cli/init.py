@@ -31,4 +31,5 @@ def init(
     warn(notes)
     write_text_whole(path, sidecar_text(camera, lights))
     document = {"scene": str(scene), "sidecar": str(path), "lights": len(lights), "status": "ok"}
-    return Report(document, (f"wrote {escape(str(path))} (camera, {len(lights)} light{'s' * (len(lights) != 1)})",))
+    counted = f"{len(lights)} light{'s' * (len(lights) != 1)}"
+    return Report(document, (f"wrote {escape(str(path))} (camera, {counted})",))

@@ -34,8 +34,8 @@ def test_gradient_is_the_runtimes_own(gl_context, light, name, start):
 
     Central differences with step h err by h²/6 of the third derivative, about 1e-3 here, and float32 adds
     1e-6/h. So the cosine between the two derivative images is above 0.99999, and their norms agree to 0.3 %.
-    For discs, edges pass over some receivers as α changes: with a thirtieth of the step, the bounds are 0.998 and
-    3 %.
+    For discs, edges pass over some receivers as α changes: with a thirtieth of the step, the bounds are 0.998
+    and 3 %.
     """
     cells = start.lloyd_iterations > 0
     step = STEP[name] / (30.0 if cells and name == "falloff_footprint" else 1.0)

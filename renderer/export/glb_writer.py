@@ -69,7 +69,7 @@ class _GlbDocument:
         for camera in scene.cameras:
             lens = {"yfov": camera.yfov, "znear": _NEAREST * diagonal, "zfar": _FARTHEST * diagonal}
             index = self._append("cameras", {"type": "perspective", "perspective": lens})
-            self._add_node("camera", camera.to_world, {"camera": index})
+            self._add_node(camera.name or "camera", camera.to_world, {"camera": index})
         self._add_lights(scene.lights)
         self._root["scenes"] = [{"name": scene.name, "nodes": list(range(len(self._root.get("nodes", []))))}]
         self._root["buffers"] = [{"byteLength": len(self._binary)}]

@@ -233,4 +233,4 @@ def _placed_light(light: Light, to_world: Float64[np.ndarray, "4 4"]) -> Light:
 
 def _placed_camera(camera: Camera, to_world: Float64[np.ndarray, "4 4"]) -> Camera:
     rigid = without_scale(to_world)
-    return camera if rigid is None else Camera(rigid, camera.yfov)
+    return camera if rigid is None else replace(camera, to_world=rigid)

@@ -148,6 +148,11 @@ class DynamicLights:
         return len(self.numbers)
 
     @property
+    def records(self) -> np.ndarray:
+        """The lights as [n] of `DYNAMIC_LIGHT_DTYPE`, point lights first."""
+        return np.ascontiguousarray(self.numbers).view(DYNAMIC_LIGHT_DTYPE).reshape(-1)
+
+    @property
     def spot_count(self) -> int:
         """Number of spot lights. They follow the point lights."""
         return len(self.numbers) - self.point_count

@@ -79,6 +79,8 @@ class Camera:
     to_world: Float64[np.ndarray, "4 4"]
     yfov: float
     """Full vertical field of view in radians, in (0, π)."""
+    name: str = ""
+    """Empty where it comes from no file, or has no name there."""
 
     @property
     def position_world(self) -> Float64[np.ndarray, "3"]:
@@ -294,4 +296,4 @@ def scaled_camera(camera: Camera, factor: float) -> Camera:
     """The camera for a scene scaled by `factor`: it frames the same image."""
     to_world = camera.to_world.copy()
     to_world[:3, 3] *= factor
-    return Camera(to_world, camera.yfov)
+    return replace(camera, to_world=to_world)

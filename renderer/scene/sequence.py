@@ -120,4 +120,4 @@ def _swung(camera: Camera, target: Float64[np.ndarray, "3"], angle: float) -> Ca
     turn = np.eye(4)
     turn[:3, :3] = [[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]]
     turn[:3, 3] = target - turn[:3, :3] @ target
-    return Camera(turn @ camera.to_world, camera.yfov)
+    return replace(camera, to_world=turn @ camera.to_world)

@@ -8,6 +8,8 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.scene.animation import Pose
+from vpltune.renderer.scene.dynamic_lights import DynamicLights, point_lights, scaled_records
 from vpltune.renderer.scene.scene import Camera, look_at, scaled
 from vpltune.renderer.scene.views import View, scaled_view
 
@@ -70,6 +72,26 @@ def test_scale_changes_nothing(gl_context, light, factor):
         expected = factor**power * np.abs(getattr(one, name)).mean(dtype=np.float64)
         found = np.abs(getattr(grown, name)).mean(dtype=np.float64)
         assert found == pytest.approx(expected, rel=2e-3)
+
+
+@pytest.mark.parametrize("factor", [1e-10, 1e10])
+def test_dynamic_lights_and_poses_follow_the_scale(gl_context, factor):
+    """In a scene that is drawn in a unit of its own, to 2e-3 as above."""
+    room, view = colored_room(), room_view("spot")
+    records = point_lights(np.array([[0.2, 0.3, 0.1], [-0.4, 0.1, 0.2]]), np.full(3, 0.4), 0.8)
+    moved = np.stack([instance.to_world for instance in room.instances])
+    moved[-1, :3, 3] += (0.1, 0.2, 0.0)
+    images = []
+    for scale in (1.0, factor):
+        runtime = Runtime(scaled(room, scale), context=gl_context)
+        grow = np.diag([scale, scale, scale, 1.0])
+        runtime.pose(Pose(grow @ moved, np.zeros((0, 4, 4)), (), ()))
+        lights = DynamicLights(scaled_records(records, scale))
+        images.append(
+            runtime.render_radiance(scaled_view(view, scale), TunedConfig(PARAMETERS), lights=lights)
+        )
+    error = np.sqrt(np.mean((images[1] - images[0]) ** 2) / np.mean(images[0] ** 2))
+    assert error < 2e-3
 
 
 def test_no_absolute_length_in_a_shader():

@@ -3,14 +3,15 @@
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
 from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.errors import InputError
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.placement import resolve_camera_and_lights, views_for_scene
+from vpltune.renderer.scene.placement import named_cameras, resolve_camera_and_lights, views_for_scene
 from vpltune.renderer.scene.scene import Camera, Light, Scene
 from vpltune.renderer.scene.views import SPLITS, View
 from vpltune.tuner.reference import ReferenceView, reference_views
@@ -45,6 +46,8 @@ class SceneOptions:
     """Bounces of indirect light in the references."""
     camera: Camera | None = None
     """Replaces the camera of the file, of its sidecar or of the automatic placement."""
+    camera_name: str | None = None
+    """A camera of the file by name or number, or `all` of them, which then share the views."""
     light: Light | None = None
     """Replaces the lights of the file, of its sidecar or of the automatic placement."""
     size: tuple[int, int] = VIEW_SIZE
@@ -166,20 +169,61 @@ def references_of(
 def _views(
     scene: Scene, scene_path: Path, options: SceneOptions, validated: bool
 ) -> tuple[tuple[View, ...], tuple[str, ...]]:
-    if options.fixed_views is not None:
-        wanted = SPLITS if validated else ("fitted", "held_out")
-        return tuple(view for view in options.fixed_views if view.split in wanted), ()
-    camera, lights, notes = resolve_camera_and_lights(
-        scene, scene_path, options.camera, None if options.light is None else (options.light,)
-    )
-    views = views_for_scene(
+    own = options.fixed_views
+    if own is not None and not validated:
+        return tuple(view for view in own if view.split in ("fitted", "held_out")), ()
+    if own is not None:
+        more = _further_views(scene, own, options.seed)
+        notes = [f"{view.name} is placed automatically: --views has no {view.split} views" for view in more]
+        return (*own, *more), tuple(notes)
+    cameras = (options.camera,)
+    if options.camera_name is not None:
+        cameras = named_cameras(scene, options.camera_name)
+    fitted = max(1, options.views // len(cameras))
+    held_out = max(1, options.views // 2) if options.held_out is None else options.held_out
+    validation = max(options.views, LEAST_VALIDATION) if validated else 0
+    views, notes = [], []
+    for each in cameras:
+        camera, lights, own_notes = resolve_camera_and_lights(
+            scene, scene_path, each, None if options.light is None else (options.light,)
+        )
+        views += views_for_scene(
+            scene,
+            camera,
+            lights,
+            fitted=fitted,
+            validation=-(-validation // len(cameras)),
+            held_out=-(-held_out // len(cameras)),
+            size=options.size,
+            seed=options.seed,
+        )
+        notes += own_notes
+    return _renamed(views), tuple(dict.fromkeys(notes))
+
+
+def _further_views(scene: Scene, own: tuple[View, ...], seed: int) -> tuple[View, ...]:
+    """Views around the first fitted one of the user's own, of each split that these lack."""
+    given = {view.split for view in own}
+    first = next((view for view in own if view.split == "fitted"), None)
+    if first is None:
+        raise InputError("--views: the file must have at least one view of the split 'fitted'")
+    placed = views_for_scene(
         scene,
-        camera,
-        lights,
-        fitted=options.views,
-        validation=max(options.views, LEAST_VALIDATION) if validated else 0,
-        held_out=max(1, options.views // 2) if options.held_out is None else options.held_out,
-        size=options.size,
-        seed=options.seed,
+        first.camera,
+        first.lights,
+        fitted=1,
+        validation=LEAST_VALIDATION,
+        held_out=1,
+        size=first.size,
+        seed=seed,
     )
-    return views, notes
+    return tuple(view for view in placed if view.split not in given)
+
+
+def _renamed(views: list[View]) -> tuple[View, ...]:
+    """The views of several cameras, sorted by split, each with a name of its own."""
+    named = []
+    for split in SPLITS:
+        of_split = [view for view in views if view.split == split]
+        named += [replace(view, name=f"{split}_{index}") for index, view in enumerate(of_split)]
+    return tuple(named)

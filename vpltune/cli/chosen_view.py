@@ -9,7 +9,7 @@ from vpltune.cli.report import warn
 from vpltune.cli.view_flags import camera_from_flags, light_from_flags
 from vpltune.cli.view_options import ViewFlags
 from vpltune.renderer.errors import InputError
-from vpltune.renderer.scene.placement import resolve_camera_and_lights
+from vpltune.renderer.scene.placement import named_camera, resolve_camera_and_lights
 from vpltune.renderer.scene.scene import Camera, Light
 from vpltune.renderer.scene.views import View, read_views
 
@@ -28,6 +28,8 @@ class ChosenView:
     """A view of `--views`; None without that flag."""
     camera: Camera | None
     """None if no camera was given."""
+    camera_name: str | None
+    """Of a camera of the file; None if none was named."""
     light: Light | None
     """None if no light was given."""
     size: tuple[int, int]
@@ -45,7 +47,8 @@ class ChosenView:
         if self.from_file is not None:
             return replace(self.from_file, size=self.size)
         given = None if self.light is None else (self.light,)
-        camera, lights, notes = resolve_camera_and_lights(scene, scene_path, self.camera, given)
+        own = self.camera if self.camera_name is None else named_camera(scene, self.camera_name)
+        camera, lights, notes = resolve_camera_and_lights(scene, scene_path, own, given)
         warn(notes)
         return View("main", "fitted", self.size, camera, lights)
 
@@ -59,7 +62,7 @@ def chosen_view(views: Path | None, name: str | None, size: str | None, flags: V
     from_file = _view_from_file(views, name, flags)
     unasked = DEFAULT_SIZE if from_file is None else from_file.size
     pixels = unasked if size is None else parse_size(size)
-    return ChosenView(from_file, camera_from_flags(flags), light_from_flags(flags), pixels)
+    return ChosenView(from_file, camera_from_flags(flags), flags.camera, light_from_flags(flags), pixels)
 
 
 def _view_from_file(path: Path | None, name: str | None, flags: ViewFlags) -> View | None:

@@ -1,12 +1,11 @@
 """`vpltune evaluate`: measures a config against the path tracer."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from vpltune.cli.options import (
-    LARGEST_VIEW_COUNT,
     VIEW_COUNT,
     BouncesOption,
     JsonOption,
@@ -17,7 +16,9 @@ from vpltune.cli.options import (
 )
 from vpltune.cli.report import Report, warn
 from vpltune.cli.view_options import ViewFlags, takes_view_flags
-from vpltune.renderer.errors import InputError
+
+if TYPE_CHECKING:
+    from vpltune.renderer.scene.views import View
 
 
 @takes_view_flags
@@ -44,6 +45,7 @@ def evaluate(
     from vpltune.cli.progress_display import shown_progress
     from vpltune.cli.quality_flags import with_flags
     from vpltune.cli.view_flags import camera_from_flags, light_from_flags
+    from vpltune.cli.views_or_file import views_or_file
     from vpltune.renderer.config.tuned_config import read_config
     from vpltune.tuner.scene_fit.evaluate_scene import EvaluateOptions, evaluate_scene
 
@@ -56,7 +58,8 @@ def evaluate(
         split_error=split_error,
         camera=camera_from_flags(flags),
         light=light_from_flags(flags),
-        **_views(views, flags != ViewFlags()),
+        camera_name=flags.camera,
+        **_views_option(views_or_file(views, flags != ViewFlags())),
     )
     with shown_progress() as progress:
         document = evaluate_scene(scene, options, progress).document
@@ -69,14 +72,8 @@ def evaluate(
     return Report(document, shown)
 
 
-def _views(text: str, placed: bool) -> dict[str, Any]:
-    """The options for the views: a number of views, or those of a file."""
-    from vpltune.renderer.scene.views import read_views
-
-    if text.isdecimal():
-        if not 1 <= len(text) <= 4 or not 1 <= int(text) <= LARGEST_VIEW_COUNT:
-            raise InputError(f"--views: must be from 1 to {LARGEST_VIEW_COUNT}, or a file, got {text:.60}")
-        return {"views": int(text)}
-    if placed:
-        raise InputError("--views: a file has its own cameras and lights; leave out the flags for these")
-    return {"views_path": Path(text), "fixed_views": read_views(Path(text))}
+def _views_option(views: "int | tuple[Path, tuple[View, ...]]") -> dict[str, Any]:
+    if isinstance(views, int):
+        return {"views": views}
+    path, fixed = views
+    return {"views_path": path, "fixed_views": fixed}

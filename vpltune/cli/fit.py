@@ -16,8 +16,8 @@ from vpltune.cli.options import (
     SeedOption,
     SplitErrorOption,
     StartOption,
-    ViewCountOption,
     ViewSizeOption,
+    ViewsOrFileOption,
     VisibilityOption,
     parse_size,
 )
@@ -33,7 +33,7 @@ def fit(
         typer.Option("-o", "--output", metavar="DIR", help="Folder for tuned.json, images and metrics."),
     ],
     config: StartOption = "default",
-    views: ViewCountOption = VIEW_COUNT,
+    views: ViewsOrFileOption = str(VIEW_COUNT),
     size: ViewSizeOption = None,
     seed: SeedOption = 0,
     visibility: VisibilityOption = None,
@@ -76,20 +76,24 @@ def fit(
     from vpltune.cli.progress_display import shown_progress
     from vpltune.cli.quality_flags import with_flags
     from vpltune.cli.view_flags import camera_from_flags, light_from_flags
+    from vpltune.cli.views_or_file import views_or_file
     from vpltune.renderer.config.tuned_config import read_config
     from vpltune.tuner.scene_fit.fit_scene import FitOptions, fit_scene
 
+    given = views_or_file(views, flags != ViewFlags())
     start, overridden = with_flags(read_config(config), visibility=visibility)
     warn(overridden)
     options = FitOptions(
         start=with_vpl_count(start, vpl_count),
         budget=budget_from_flags(vpl_count, budget_ms, pareto, frame_size),
         motion=motion,
-        views=views,
+        views=given if isinstance(given, int) else len(given[1]),
+        fixed_views=None if isinstance(given, int) else given[1],
         seed=seed,
         bounces=bounces,
         split_error=split_error,
         camera=camera_from_flags(flags),
+        camera_name=flags.camera,
         light=light_from_flags(flags),
         command=command_line(),
     )

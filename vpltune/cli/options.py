@@ -75,6 +75,15 @@ StartOption = Annotated[
         "--config", metavar="START.json", help="Start from this config: a file, `default` or `auto`."
     ),
 ]
+ViewsOrFileOption = Annotated[
+    str,
+    typer.Option(
+        "--views",
+        metavar="N|FILE",
+        help="Number of fitted views; as many validate the fit, and half as many are held out. Or a "
+        "views.json with views of your own.",
+    ),
+]
 ViewCountOption = Annotated[
     int,
     typer.Option(

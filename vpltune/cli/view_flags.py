@@ -25,6 +25,10 @@ def camera_from_flags(flags: ViewFlags) -> Camera | None:
     """
     if flags.eye is None and flags.look_at is None and flags.yfov is None:
         return None
+    if flags.camera is not None:
+        raise InputError(
+            "--camera: a camera of the file has its own place; leave out --eye, --look-at, --yfov"
+        )
     if flags.eye is None or flags.look_at is None:
         raise InputError("--eye and --look-at: a camera needs both")
     eye = _vector(flags.eye, "--eye")

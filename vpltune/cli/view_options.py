@@ -28,6 +28,9 @@ def _view_option(metavar: str, description: str) -> typer.models.OptionInfo:
 class ViewFlags:
     """Camera and light as given on the command line; None if a flag is absent."""
 
+    camera: Annotated[
+        str | None, _view_option("NAME", "A camera of the file, by name or number; for fits also `all`.")
+    ] = None
     eye: Annotated[str | None, _view_option("X,Y,Z", "Position of the camera.")] = None
     look_at: Annotated[str | None, _view_option("X,Y,Z", "Point it looks at, with +Y up.")] = None
     yfov: Annotated[float | None, _view_option("DEG", "Vertical field of view, in degrees. [50]")] = None

@@ -1,6 +1,7 @@
 """Conversion of a glTF document to a scene: the meshes, lights and cameras of the active scene's nodes."""
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -81,7 +82,8 @@ class _SceneBuilder:
             self._count(1, "cameras", MAX_CAMERAS)
             filming = read_camera(camera, self.nodes.to_world(index), self.document)
             if filming is not None:
-                self.cameras.append(filming)
+                name = camera.string("name", "") or node.string("name", "")
+                self.cameras.append(replace(filming, name=label(name, "")))
                 self.placed.camera_nodes.append(index)
         if light is not None:
             self._count(1, "lights", MAX_LIGHTS)

@@ -133,7 +133,9 @@ def completed_camera_and_lights(
     if camera is None and scene.cameras:
         camera = scene.cameras[0]
         if len(scene.cameras) > 1:
-            notes.append(f"the file has {len(scene.cameras)} cameras; the first one is used")
+            notes.append(
+                f"the file has {len(scene.cameras)} cameras; the first one is used (--camera takes another)"
+            )
     own_lights = lights is not None
     lights = lights if own_lights else scene.lights
     if camera is None:

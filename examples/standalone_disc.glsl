@@ -1,6 +1,6 @@
 // Irradiance from a clustered disc light, for standalone_reader.py: a disc of even radiosity, cut off at the receiver's
 // horizon. The program defines least_part (a share of the disc's area), least_radius in units of scene_length,
-// fade_height, facing_fade_height, near_start and near_end in radii. The derivation is in shaders/common/vpl_disc.glsl.
+// fade_height and facing_fade_height in radii. The derivation is in shaders/common/vpl_disc.glsl.
 
 #ifdef LIGHTING
 // A chord cuts a unit disc at distance t from the centre, t > 0 if the centre is on the kept side. Returns the kept
@@ -33,14 +33,12 @@ float disc_form(vec3 d, vec3 n, vec3 m, float radius) {
     // and Mengüç 2010, form factors to a disc parallel and at right angles to the element).
     vec3 middle = d + (n - between * m) * (part.y * radius / slope);
     float dd = dot(middle, middle), rr = radius * radius * part.x;
-    vec2 axial = disc_axial(dd, height, rr);
+    vec2 axial = disc_axial(dd, height, rr), uncut = disc_axial(dot(d, d), height, radius * radius);
     vec3 vector = (middle + height * m) * (height / (axial.x + dd + rr)) - m * axial.y;
-    // Close to the disc, it is nearly a half-space, which it shares with the discs beside it.
-    float rim = sqrt(max(dot(d, d) - height * height, 0.0)) / radius;
-    float near = clamp((near_end - rim) / (near_end - near_start), 0.0, 1.0);
-    float axial_form = radius * radius / (radius * radius + height * height);
+    // Close to the disc, it is nearly a half-space.
+    float facing_form = 2.0 * radius * radius * uncut.y / uncut.x;
     float above = clamp(2.0 * dot(n, d) / (slope * radius), 0.0, 1.0);
-    float least = above * 0.5 * (1.0 - between) * near * pow(axial_form, 4.0) / (radius * radius);
+    float least = above * 0.5 * (1.0 - between) * pow(facing_form, 4.0) / (radius * radius);
     return max(dot(n, vector) * 2.0 * part.x / axial.x, least) * fade;
 }
 #endif

@@ -9,7 +9,6 @@ LEAST_PART = 1e-4
 LEAST_RADIUS = 1e-6
 FADE_HEIGHT = 0.002
 FACING_FADE_HEIGHT = 0.4
-NEAR_START, NEAR_END = 0.9, 1.5
 
 
 def point_form(position, normal, vpls: Vpls, alpha: float) -> np.ndarray:
@@ -44,11 +43,10 @@ def disc_form(position, normal, vpls: Vpls, alpha: float, scene_length: float) -
     q, axial = disc_axial(squared, height, radius_squared)
     lateral = height / (q + squared + radius_squared)
     vector = (to_part + height[..., None] * vpl_normal) * lateral[..., None] - vpl_normal * axial[..., None]
-    # Close to the disc, it is nearly a half-space, which it shares with the discs beside it.
-    rim = np.sqrt(np.maximum(dot(to_vpl, to_vpl) - height**2, 0.0)) / radius
-    near = np.clip((NEAR_END - rim) / (NEAR_END - NEAR_START), 0.0, 1.0)
-    axial_form = radius**2 / (radius**2 + height**2)
-    least = np.clip(2.0 * above, 0.0, 1.0) * 0.5 * (1.0 - between) * near * axial_form**4 / radius**2
+    # Close to the disc, it is nearly a half-space.
+    uncut_q, uncut_axial = disc_axial(dot(to_vpl, to_vpl), height, radius**2)
+    facing_form = 2.0 * radius**2 * uncut_axial / uncut_q
+    least = np.clip(2.0 * above, 0.0, 1.0) * 0.5 * (1.0 - between) * facing_form**4 / radius**2
     received = np.maximum(dot(normal, vector) * 2.0 * share / q, least) * fade
     return np.where(lit, received, 0.0) / scene_length**2
 

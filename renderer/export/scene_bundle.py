@@ -123,8 +123,6 @@ def _clustered_discs(config: TunedConfig) -> dict[str, Any]:
             "least_radius": vpl_disc_bounds.LEAST_RADIUS,
             "fade_height": vpl_disc_bounds.FADE_HEIGHT,
             "facing_fade_height": vpl_disc_bounds.FACING_FADE_HEIGHT,
-            "near_start": vpl_disc_bounds.NEAR_START,
-            "near_end": vpl_disc_bounds.NEAR_END,
         },
     }
 

@@ -6,22 +6,16 @@ LEAST_RADIUS = 1e-6
 """In L: dark VPLs have no footprint."""
 FADE_HEIGHT = 0.002
 """In radii: where a disc's light begins to fade towards its own plane. At half of that it is gone: so near,
-an RSM's depth does not tell which side of a surface a receiver is on. A choice of 0.02, 0.005, 0.002 and
-0.001: with 0.02, the last pixel of a floor before a wall was dark."""
+an RSM's depth does not tell which side of a surface a receiver is on. A choice of 0.02, 0.005 and 0.002: with
+0.02, the last pixel of a floor before a wall was dark."""
 FACING_FADE_HEIGHT = 0.4
 """In radii: how much higher a receiver fades that faces the disc's plane squarely. On the other side of a
 curtain's fold, or under a low board, one ray says too little. A choice of 0, 0.1, 0.2 and 0.4: folded
 curtains, and boards 3 to 20 cm above a floor, have the least error."""
-NEAR_START, NEAR_END = 0.9, 1.5
-"""In radii from the disc's middle: where its light begins and ends to fall off for receivers close to its
-plane. A choice of five pairs: discs side by side light the foot of a wall most evenly, and generated and
-shipped scenes have the least error."""
 
 DEFINES = {
     "DISC_LEAST_PART": LEAST_PART,
     "DISC_LEAST_RADIUS": LEAST_RADIUS,
     "DISC_FADE_HEIGHT": FADE_HEIGHT,
     "DISC_FACING_FADE_HEIGHT": FACING_FADE_HEIGHT,
-    "DISC_NEAR_START": NEAR_START,
-    "DISC_NEAR_END": NEAR_END,
 }

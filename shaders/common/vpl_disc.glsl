@@ -1,7 +1,8 @@
 // Irradiance from a clustered disc light: a disc of even radiosity, cut off at the receiver's horizon.
 //
 // Provides: `disc_vector_irradiance`. Needs PI, common/virtual_point_lights.glsl and common/vpl_irradiance.glsl.
-// Constants, with the prefix DISC_: renderer/frame/vpl_disc_bounds.py.
+// Constants: DISC_LEAST_PART, DISC_LEAST_RADIUS, DISC_FADE_HEIGHT and DISC_FACING_FADE_HEIGHT of
+// renderer/frame/vpl_disc_bounds.py.
 // Twin: tuner/surrogate/vpl_disc.py. A short version: examples/standalone_disc.glsl.
 //
 // The disc has centre c, normal m, radius l and flux Φ. A receiver at x, with normal n, is h = m·(x - c) > 0 above its
@@ -12,11 +13,10 @@
 // This holds while the whole disc is above the receiver's horizon. Otherwise the part above the horizon is taken as a
 // disc of its own area around its own centroid. (Baum et al. 1989 clip polygons at the horizon.)
 // Close to the disc, that replacement dips below the horizon, and its two sides cancel. There the emitter is nearly a
-// half-space, whose form factor is (1 - m·n)/2. So E is at least Φ/(πl²) (1 - m·n)/2 F⁴ w. F = l²/(l² + h²) is the form
-// factor on the disc's axis; the exponent has the least error against numerical integrals
-// (tests/physics/test_vpl_disc.py). w falls from 1 at NEAR_START radii from the axis to 0 at NEAR_END, beyond the disc:
-// along the foot of a wall, the gaps between discs would be dark. Only where the centre is well above the horizon: a
-// disc whose centre is behind a thin wall must not shine in front of it.
+// half-space, whose form factor is (1 - m·n)/2. So E is at least Φ/(πl²) (1 - m·n)/2 F⁴, F being the form factor of the
+// uncut disc for a receiver that faces it. The exponent has the least error against numerical integrals
+// (tests/physics/test_vpl_disc.py). Only where the centre is well above the horizon: a disc whose centre is behind a thin
+// wall must not shine in front of it.
 
 // A chord cuts a unit disc. `t` is the centre's signed distance from the chord, positive where the centre is on the
 // kept side. Returns x, the kept part's share of the area, and y, the distance of its centroid from the centre.
@@ -64,12 +64,10 @@ vec3 disc_vector(vec3 to_vpl, vec3 normal, vec3 vpl_normal, float radius) {
     vec2 axial = disc_axial(distance_squared, height, radius_squared);
     float lateral = height / (axial.x + distance_squared + radius_squared);
     vec3 vector = ((to_part + height * vpl_normal) * lateral - vpl_normal * axial.y) * (2.0 * part.x / axial.x);
-    float rim = sqrt(max(dot(to_vpl, to_vpl) - height * height, 0.0)) / radius;
-    float near = clamp((DISC_NEAR_END - rim) / (DISC_NEAR_END - DISC_NEAR_START), 0.0, 1.0);
-    float axial_form = radius * radius / (radius * radius + height * height);
-    float squared_form = axial_form * axial_form;
-    float half_space = clamp(2.0 * above, 0.0, 1.0) * 0.5 * (1.0 - between);
-    float least = half_space * near * squared_form * squared_form / (radius * radius);
+    vec2 uncut = disc_axial(dot(to_vpl, to_vpl), height, radius * radius);
+    float facing_form = 2.0 * radius * radius * uncut.y / uncut.x;
+    float squared_form = facing_form * facing_form;
+    float least = clamp(2.0 * above, 0.0, 1.0) * 0.5 * (1.0 - between) * squared_form * squared_form / (radius * radius);
     return (vector + normal * max(least - dot(normal, vector), 0.0)) * fade;
 }
 

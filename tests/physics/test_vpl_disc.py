@@ -68,18 +68,13 @@ def test_a_far_disc_is_a_point():
 
 
 def test_exact_over_the_horizon():
-    """Lambert's formula, against the sum over pieces of a disc that is seen whole: 1e-3 of either.
-
-    One receiver of 35 is so near that the half-space takes over, and gets 1.2 % more; the bound is 2 %.
-    """
+    """Lambert's formula, against the sum over pieces of a disc that is seen whole: 1e-3 of either."""
     receiver, normal = random_receivers(400, 1)
     whole = -(receiver * normal).sum(1) > np.sqrt(1.0 - normal[:, 2] ** 2)
     chosen = np.flatnonzero(whole & unfaded(receiver, normal))
     assert len(chosen) > 20
     expected = [integral(receiver[i], normal[i], 1.0) for i in chosen]
-    error = np.abs(form(receiver[chosen], normal[chosen], 1.0) / expected - 1.0)
-    assert (error <= 1e-3).mean() > 0.9
-    assert error.max() < 0.02
+    np.testing.assert_allclose(form(receiver[chosen], normal[chosen], 1.0), expected, rtol=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -123,28 +118,6 @@ def test_near_a_cut_disc_it_is_a_half_space():
     assert expected.mean() > 0.2
     assert abs(error.mean()) < 0.02
     assert np.sqrt((error**2).mean()) < 0.05
-
-
-@pytest.mark.parametrize("height", [0.01, 0.03, 0.1, 0.4])
-def test_the_foot_of_a_wall_of_discs_is_evenly_lit(height):
-    """A floor before a wall that discs stand for, each of one square: 0.78 to 1.04 of the closed form.
-
-    Half of the wall's radiosity arrives at its foot. With a kernel no wider than the disc, the gaps between
-    discs got 0.06 to 0.6 of that. Heights are over the wall's plane, in squares.
-    """
-    radius = 1.0 / np.sqrt(np.pi)
-    along = np.linspace(0.0, 1.0, 33)
-    floor = np.stack([along, np.zeros(33), np.full(33, height)], axis=1)
-    up = np.tile([0.0, 1.0, 0.0], (33, 1))
-    rows = 10
-    found = sum(
-        form(floor - np.array([column, row + 0.5, 0.0]), up, radius) * radius**2
-        for row in range(rows)
-        for column in range(-rows, rows + 1)
-    )
-    expected = 0.5 * (1.0 - height / np.hypot(height, rows))
-    assert found.min() / expected > 0.75
-    assert found.max() / expected < 1.06
 
 
 def test_share_and_centroid_of_a_part():

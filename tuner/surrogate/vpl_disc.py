@@ -8,13 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from vpltune.renderer.frame.vpl_disc_bounds import (
-    FACING_FADE_HEIGHT,
-    FADE_HEIGHT,
-    LEAST_PART,
-    NEAR_END,
-    NEAR_START,
-)
+from vpltune.renderer.frame.vpl_disc_bounds import FACING_FADE_HEIGHT, FADE_HEIGHT, LEAST_PART
 
 
 def disc_past_chord(t: Float[Array, "*n"]) -> tuple[Float[Array, "*n"], Float[Array, "*n"]]:
@@ -86,8 +80,7 @@ def disc_form(
     q, axial = disc_axial(distance_squared, height, radius_squared)
     lateral = height / (q + distance_squared + radius_squared)
     received = (facing + shift * slope + height * between) * lateral - between * axial
-    rim = jnp.sqrt(jnp.maximum(squared - height**2, 1e-18)) / radius
-    near = jnp.clip((NEAR_END - rim) / (NEAR_END - NEAR_START), 0.0, 1.0)
-    axial_form = radius**2 / (radius**2 + height**2)
-    least = jnp.clip(2.0 * above, 0.0, 1.0) * 0.5 * (1.0 - between) * near * axial_form**4 / radius**2
+    uncut_q, uncut_axial = disc_axial(squared, height, radius**2)
+    facing_form = 2.0 * radius**2 * uncut_axial / uncut_q
+    least = jnp.clip(2.0 * above, 0.0, 1.0) * 0.5 * (1.0 - between) * facing_form**4 / radius**2
     return jnp.where(lit, jnp.maximum(received * (2.0 * share / q), least) * fade, 0.0)

@@ -43,8 +43,10 @@ def guarded(command: Callable[[], int], name: str) -> int:
         return command()
     signals, wake = os.pipe()
     os.set_blocking(wake, False)
-    # Signals are read from the pipe. Without a handler, Python would act on them itself.
-    for each in (*_ENDINGS, signal.SIGCHLD):
+    # Signals are read from the pipe. Without a handler, Python would act on them itself. What is ignored, as
+    # under nohup, stays so.
+    heeded = [each for each in _ENDINGS if signal.getsignal(each) is not signal.SIG_IGN]
+    for each in (*heeded, signal.SIGCHLD):
         signal.signal(each, _ignored)
     signal.set_wakeup_fd(wake)
     words, speak = os.pipe()
@@ -53,9 +55,12 @@ def guarded(command: Callable[[], int], name: str) -> int:
         signal.set_wakeup_fd(-1)
         for descriptor in (signals, wake, words):
             os.close(descriptor)
-        return _child(command, speak)
+        return _child(command, speak, heeded)
     os.close(speak)
-    return _Guard(child, name, signals, words).wait()
+    code = _Guard(child, name, signals, words).wait()
+    for each in heeded:
+        signal.signal(each, signal.SIG_IGN)  # all is said: another one must not change the exit code
+    return code
 
 
 @contextlib.contextmanager
@@ -88,15 +93,16 @@ def _ignored(number: int, frame: FrameType | None) -> None:
     """A handler, and not SIG_IGN, which programs that the command starts would inherit."""
 
 
-def _child(command: Callable[[], int], speak: int) -> int:
+def _child(command: Callable[[], int], speak: int, heeded: list[int]) -> int:
     global _pipe_to_guard
     from vpltune.renderer.files import unfinished_files
 
     _pipe_to_guard = speak
     unfinished_files.tell(speak)
     # A terminal sends SIGINT to both; the guard alone acts on it.
-    for number in (signal.SIGCHLD, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_DFL)
+    for number in (signal.SIGCHLD, *heeded):
+        if number != signal.SIGINT:
+            signal.signal(number, signal.SIG_DFL)
     _die_with_the_guard()
     return command()
 

@@ -93,7 +93,10 @@ def require_writable(folder: Path) -> None:
     there = next(each for each in (folder, *folder.absolute().parents) if each.exists())
     if not there.is_dir():
         raise InputError(f"{there}: must be a folder, got a file")
-    trial = _temporary(there / "trial")
+    try:
+        trial = _temporary(there / "trial")
+    except MachineError as error:
+        raise MachineError(f"{folder}: cannot be written to ({error.__cause__})") from error
     try:
         with trial.open("wb") as file:
             file.write(bytes(TRIAL_BYTES))

@@ -1,11 +1,14 @@
 """`vpltune init`: the sidecar holds what would be chosen without it, and is not overwritten unasked."""
 
+import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from vpltune.cli.program import run
+from vpltune.renderer.export.glb_writer import write_glb
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.placement import resolve_camera_and_lights
 from vpltune.renderer.scene.placement.scene_sidecar import read_sidecar
@@ -19,13 +22,13 @@ def check_written(scene_path):
     camera, lights, _ = resolve_camera_and_lights(scene, scene_path, None, None)
     assert run(["init", str(scene_path)]) == 0
     own_camera, own_lights = read_sidecar(scene_path.with_suffix(".vpltune.toml"))
-    # Seven digits are written.
-    np.testing.assert_allclose(own_camera.to_world, camera.to_world, atol=1e-4)
+    # Fifteen digits are written; the matrix of a look_at is another way to the same.
+    np.testing.assert_allclose(own_camera.to_world, camera.to_world, atol=1e-6)
     assert [light.kind for light in own_lights] == [light.kind for light in lights]
     for own, light in zip(own_lights, lights, strict=True):
-        np.testing.assert_allclose(own.intensity, light.intensity, rtol=1e-5)
+        np.testing.assert_allclose(own.intensity, light.intensity, rtol=1e-12)
         if light.kind != "directional":
-            np.testing.assert_allclose(own.position_world, light.position_world, atol=1e-4)
+            np.testing.assert_allclose(own.position_world, light.position_world, rtol=1e-12)
 
 
 def test_an_automatic_choice_is_written(tmp_path, capfd):
@@ -50,3 +53,23 @@ def test_a_sidecar_is_replaced_only_when_asked(tmp_path, capfd):
     assert sidecar.read_text() == "mine"
     assert run(["init", str(path), "--force"]) == 0
     assert sidecar.read_text().startswith("#")
+
+
+def test_a_roll_is_told(tmp_path, capfd):
+    """A sidecar's camera is upright."""
+    scene = read_scene(GALLERY)
+    turn = np.eye(4)
+    turn[:2, :2] = [[np.cos(0.5), -np.sin(0.5)], [np.sin(0.5), np.cos(0.5)]]
+    rolled = replace(scene.cameras[0], to_world=scene.cameras[0].to_world @ turn)
+    write_glb(tmp_path / "rolled.glb", replace(scene, cameras=(rolled,)))
+    assert run(["init", str(tmp_path / "rolled.glb")]) == 0
+    assert "rolled about its view axis" in capfd.readouterr().err
+
+
+def test_a_pipe_is_no_sidecar(tmp_path, capfd):
+    """It would be waited for without end."""
+    path = tmp_path / "room.obj"
+    path.write_text(TRIANGLES)
+    os.mkfifo(tmp_path / "room.vpltune.toml")
+    assert run(["render", str(path), "-o", str(tmp_path / "x.png"), "--size", "32x24"]) == 2
+    assert "room.vpltune.toml: must be a file" in capfd.readouterr().err

@@ -119,6 +119,31 @@ def test_a_crash_is_said(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no terminals that hang up")
+def test_an_ignored_signal_stays_ignored(tmp_path):
+    """nohup ignores SIGHUP before the command starts."""
+    body = "print('ready', flush=True)\ntime.sleep(1.0)\nPath('done').touch()\nreturn 0"
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        process = started(body, tmp_path)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    process.send_signal(signal.SIGHUP)
+    _, said = process.communicate(timeout=60)
+    assert (process.returncode, said) == (0, "")
+    assert (tmp_path / "done").exists()
+
+
+@pytest.mark.parametrize("closed", ["1", "2"])
+def test_a_closed_stream_is_no_failure(tmp_path, closed):
+    scene = tmp_path / "none.glb"
+    scene.write_bytes(b"no scene")
+    command = f"{sys.executable} -m vpltune fit {scene} -o {tmp_path / 'out'} {closed}>&-"
+    done = subprocess.run(["sh", "-c", command], cwd=REPOSITORY, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stdout + done.stderr
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["render", "fit", "batch", "report"])
 def test_signals_at_any_moment(tmp_path, command):

@@ -140,6 +140,8 @@ def read_view_images(path: Path) -> tuple[ViewImages, ...]:
     """
     if not path.exists():
         return ()
+    if not path.is_file():
+        raise InputError(f"{path}: must be a file")
     try:
         with path.open("rb") as file:
             _check_size(file, path)
@@ -192,9 +194,12 @@ def _view(path: Path, index: int, members: dict[str, np.ndarray]) -> ViewImages:
             raise InputError(f"{path}: member {index}/{name} must be {valid.shape} finite half floats")
         return pixels.astype(np.float32)
 
+    level = member("level")
+    if level.shape != () or level.dtype != np.float32 or not np.isfinite(level):
+        raise InputError(f"{path}: member {index}/level must be one finite float32")
     return ViewImages(
         index=index,
-        level=float(member("level")),
+        level=float(level),
         valid=valid,
         reference_albedo=image("reference_albedo"),
         reference_direct=image("reference_direct"),

@@ -8,6 +8,9 @@ from vpltune.cli.options import JsonOption, SceneArgument
 from vpltune.cli.report import Report, warn
 from vpltune.renderer.errors import InputError
 
+LEAST_ROLL = 1e-3
+"""Sine of a camera's roll that is told. A choice: half a pixel at the side of an image of 1,000."""
+
 
 def init(
     scene: SceneArgument,
@@ -29,6 +32,8 @@ def init(
     warn(loaded.warnings)
     camera, lights, notes = completed_camera_and_lights(loaded, scene, None, None)
     warn(notes)
+    if abs(camera.to_world[1, 0]) > LEAST_ROLL:
+        warn(("the camera is rolled about its view axis, which a sidecar cannot say; it will be upright",))
     write_text_whole(path, sidecar_text(camera, lights))
     document = {"scene": str(scene), "sidecar": str(path), "lights": len(lights), "status": "ok"}
     counted = f"{len(lights)} light{'s' * (len(lights) != 1)}"

@@ -97,8 +97,10 @@ def before_any_command(
 
 def main() -> int:
     """Run the command line of this process, and return its exit code."""
-    # Started with stdout closed, Python has none; the first file opened then stands in its place.
-    sys.stdout = sys.stdout or Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115
+    # Started with a stream closed, Python has none; the first file opened then stands in its place.
+    for stream in ("stdout", "stderr"):
+        if getattr(sys, stream) is None:
+            setattr(sys, stream, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
     code = run(sys.argv[1:])
     try:
         sys.stdout.flush()

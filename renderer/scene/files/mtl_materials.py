@@ -9,9 +9,11 @@ from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, l
 from vpltune.renderer.scene.files.image_texels import MTL_FORMATS, ImageDecoder
 from vpltune.renderer.scene.files.plain_numbers import plain_number
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
-from vpltune.renderer.scene.files.text_lines import first_word, text_lines
+from vpltune.renderer.scene.files.text_lines import first_word, text_lines, without_remark
 from vpltune.renderer.scene.scene import Material, Texture, Wrap
 
+# Statements that end in a name.
+_NAMING = (b"newmtl", b"map_kd")
 # Options of map_Kd and how many words follow each. The options in `_TRANSFORMS` take one to three numbers.
 _MAP_OPTIONS = {
     "-blendu": 1,
@@ -173,7 +175,9 @@ class MtlMaterials:
             return False
         definition: _Definition | None = None
         for number, line in text_lines(content, f"{name!r:.80}"):
-            keyword, rest = first_word(line.split(b"#", 1)[0])
+            keyword, rest = first_word(without_remark(line))
+            if keyword.lower() not in _NAMING:
+                rest = rest.partition("#")[0].strip()
             if keyword == b"newmtl":
                 definition = self._definitions.setdefault(rest, _Definition())
                 if len(self._definitions) > _MOST_DEFINITIONS:

@@ -20,7 +20,7 @@ from vpltune.renderer.scene.files.plain_numbers import finite_numbers, plain_ind
 from vpltune.renderer.scene.files.polygon_triangulation import triangulated
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
 from vpltune.renderer.scene.files.surface import Surface, finished_mesh, used_vertices
-from vpltune.renderer.scene.files.text_lines import first_word, text_lines
+from vpltune.renderer.scene.files.text_lines import first_word, text_lines, without_remark
 from vpltune.renderer.scene.scene import Instance, Mesh, Scene
 
 # Grouping, levels of detail and display hints, which do not change the surface: no warning for these.
@@ -99,9 +99,9 @@ def _parse(content: bytes, warnings: Warnings, decoded: DecodedBytes) -> _ObjTex
         elif keyword in (b"f", b"fo"):
             _parse_face(_words(line), text, material, f"line {number}", warnings)
         elif keyword == b"usemtl":
-            material = first_word(line)[1]
+            material = first_word(without_remark(line))[1]
         elif keyword == b"mtllib":
-            text.libraries[first_word(line)[1]] = None
+            text.libraries[first_word(without_remark(line))[1]] = None
         elif keyword in (b"p", b"l"):
             warnings.tally("1 point or line element is ignored", "{n} point or line elements are ignored")
         elif keyword in _FREE_FORM_KEYWORDS:

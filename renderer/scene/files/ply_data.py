@@ -1,5 +1,6 @@
 """Parser for PLY: the header, and the columns of its elements from ASCII or binary data."""
 
+import re
 import struct
 from dataclasses import dataclass, field
 from typing import Literal
@@ -25,6 +26,8 @@ _BYTE_ORDERS: dict[str, Literal["<", ">", ""]] = {
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 # A choice: most bytes of a header.
 _LONGEST_HEADER = 1 << 16
+# A line of its own: comments may hold the word too.
+_END_OF_HEADER = re.compile(rb"[\r\n](end_header)[ \t]*(?=[\r\n]|$)")
 # A choice: bytes of ASCII data that are split at a time. A word takes 40 bytes of memory then.
 _CHUNK = 1 << 20
 # A choice: most characters of a number in ASCII data.
@@ -79,10 +82,10 @@ def parse_ply_header(content: bytes) -> PlyHeader:
         SceneFileError: the content does not start with a valid PLY header.
     """
     begin = len(_BYTE_ORDER_MARK) if content.startswith(_BYTE_ORDER_MARK) else 0
-    end = content.find(b"end_header", begin, _LONGEST_HEADER)
-    if not content.startswith(b"ply", begin) or end < 0:
+    ended = _END_OF_HEADER.search(content, begin, _LONGEST_HEADER)
+    if not content.startswith(b"ply", begin) or ended is None:
         raise SceneFileError("header: must begin with 'ply' and end with 'end_header'")
-    size = end + len(b"end_header")
+    end, size = ended.start(1), ended.end()
     size += 2 if content[size : size + 2] == b"\r\n" else 1
     byte_order, texture_name, elements = None, "", []
     for line in content[begin + 3 : end].decode("utf-8", "replace").splitlines():

@@ -1,6 +1,7 @@
 """Lines of OBJ and MTL files, one at a time: a list of all lines would take ten times the file's memory."""
 
 import io
+import re
 from collections.abc import Iterator
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
@@ -11,7 +12,7 @@ _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
 def text_lines(content: bytes, where: str) -> Iterator[tuple[int, bytes]]:
-    """Each line with its number, from 1. A backslash at the end of a line joins it with the next.
+    """Each line with its number, from 1. A backslash at its end joins it with the next, but not a comment.
 
     Lines end in a line feed, a carriage return, or both. A byte-order mark is passed over.
 
@@ -37,7 +38,8 @@ def text_lines(content: bytes, where: str) -> Iterator[tuple[int, bytes]]:
         size += len(line)
         if size > _LONGEST_LINE:
             raise SceneFileError(f"{prefix}line {first}: must have at most {_LONGEST_LINE:,} bytes")
-        if line.endswith(b"\\"):
+        comment = not parts and line.lstrip().startswith(b"#")
+        if line.endswith(b"\\") and not comment:
             parts.append(line[:-1])
             continue
         if parts:
@@ -51,6 +53,11 @@ def text_lines(content: bytes, where: str) -> Iterator[tuple[int, bytes]]:
         size, first = 0, number + 1
     if parts:
         yield first, b" ".join(parts)
+
+
+def without_remark(line: bytes) -> bytes:
+    """A line that ends in a name, without a comment. In `Material #25`, of 3ds Max, `#` begins none."""
+    return re.split(rb"\s#(?=\s|$)", line, maxsplit=1)[0]
 
 
 def first_word(line: bytes) -> tuple[bytes, str]:

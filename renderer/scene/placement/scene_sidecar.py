@@ -47,6 +47,8 @@ LIGHT_KEYS: dict[LightKind, tuple[str, ...]] = {
     "point": ("type", "position", "intensity"),
     "directional": ("type", "direction", "look_at", "position", "intensity"),
 }
+# A choice: largest number, a place or an intensity; scenes lie within 1e12 units, and a sun may stand beyond.
+LARGEST = 1e18
 # A choice: most bytes of a sidecar, which usually has 500.
 _LARGEST_FILE = 1 << 20
 # A choice: if the scene file's lights reach a smaller share of the image than this, they are replaced.
@@ -100,6 +102,8 @@ def resolve_camera_and_lights(
         InputError: the sidecar exists but is invalid, or the scene has no triangles.
     """
     path = sidecar_path(scene_path)
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: must be a file")  # a pipe would be waited for
     camera, lights = read_sidecar(path) if path.exists() else (None, None)
     notes = []
     if camera_override is None or light_override is None:
@@ -174,12 +178,13 @@ def _numbers(
         raise InputError(f"{where}: key '{key}' is missing")
     value = table[key]
     items = value if isinstance(value, list) else [value]
-    # TOML has inf and nan, larger numbers overflow float32, and bool is a subclass of int.
+    # TOML has inf and nan, and bool is a subclass of int.
     plain = all(isinstance(item, int | float) and not isinstance(item, bool) for item in items)
-    if not plain or len(items) not in counts or not all(abs(item) <= 1e30 for item in items):
+    if not plain or len(items) not in counts or not all(abs(item) <= LARGEST for item in items):
         wanted = " or ".join(str(count) for count in counts)
         raise InputError(
-            f"{where}: '{key}' must be {wanted} finite number{'s' * (counts != (1,))}, got {value!r:.60}"
+            f"{where}: '{key}' must be {wanted} number{'s' * (counts != (1,))} of at most {LARGEST:g}, "
+            f"got {value!r:.60}"
         )
     return np.array(items, np.float64)
 

@@ -55,7 +55,7 @@ def _alike(one: str, other: str) -> bool:
 
 
 def sidecar_text(camera: Camera, lights: Sequence[Light]) -> str:
-    """A sidecar with these, seven digits of each number.
+    """A sidecar with these.
 
     Args:
         camera: a roll about its view axis is lost, since a sidecar's camera has +Y up.
@@ -91,4 +91,4 @@ def _numbers(values: Float64[np.ndarray, "3"]) -> str:
 
 def _number(value: float) -> str:
     # + 0.0 turns −0 into 0.
-    return f"{value + 0.0:.7g}"
+    return f"{value + 0.0:.15g}"

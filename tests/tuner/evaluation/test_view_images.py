@@ -108,6 +108,8 @@ def test_what_is_broken_is_refused_by_name(tmp_path):
         ("0/direct", np.zeros((6, 8, 3), np.float32), r"0/direct must be \(6, 8\) finite half floats"),
         ("0/direct", np.full((6, 8, 3), np.nan, np.float16), "finite half floats"),
         ("0/valid", np.ones((6, 8, 3), bool), "0/valid must be an image"),
+        ("0/level", np.zeros(0, np.float32), "0/level must be one finite float32"),
+        ("0/level", np.float32(np.nan), "0/level must be one finite float32"),
     ):
         changed = {key: value for key, value in {**members, name: wrong}.items() if value is not None}
         np.savez_compressed(path, **changed)

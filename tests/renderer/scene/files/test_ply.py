@@ -144,3 +144,13 @@ def test_broken_headers_are_refused(tmp_path, header, message):
 def test_not_a_number_is_refused(tmp_path):
     with pytest.raises(InputError, match="x, y, z must be finite"):
         read_scene(write_ply(tmp_path, "ascii", [(0, 0, "nan"), *POINTS], FACES))
+
+
+def test_a_comment_may_name_the_end(tmp_path):
+    path = tmp_path / "triangle.ply"
+    path.write_text(
+        "ply\nformat ascii 1.0\ncomment without end_header here\nelement vertex 3\n"
+        "property float x\nproperty float y\nproperty float z\nelement face 1\n"
+        "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    )
+    assert read_scene(path).triangle_count() == 1

@@ -174,3 +174,25 @@ def test_numbers_across_borders_stay_whole(tmp_path):
     header = PLY.decode().replace("vertex 3", f"vertex {count}").replace("face 1", f"face {count // 3}")
     (mesh,) = read_bytes(tmp_path, header + text + "\n" + faces + "\n", "a.ply").meshes
     np.testing.assert_array_equal(mesh.positions[mesh.triangles.ravel()], vertices.astype(np.float32))
+
+
+QUAD = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+
+
+def test_a_comment_is_not_continued(tmp_path):
+    """`# C:\\scenes\\` is a path, and the vertex below it a vertex."""
+    path = tmp_path / "quad.obj"
+    path.write_text("# C:\\scenes\\\n" + QUAD + "v 9 9 9\nf 1 2 3 4\n")
+    (mesh,) = read_scene(path).meshes
+    np.testing.assert_array_equal(mesh.positions.max(axis=0), [1.0, 1.0, 0.0])
+
+
+def test_names_keep_their_number_signs_and_lose_remarks(tmp_path):
+    (tmp_path / "m #1.mtl").write_text("newmtl Material #25 # bricks\nKd 0.2 0.4 0.6 #grey\n")
+    path = tmp_path / "quad.obj"
+    path.write_text(f"mtllib m #1.mtl # here\n{QUAD}usemtl Material #25 # walls\nf 1 2 3 4\n")
+    scene = read_scene(path)
+    np.testing.assert_allclose(
+        scene.materials[scene.meshes[0].material].base_color, [0.2, 0.4, 0.6], atol=1e-6
+    )
+    assert not scene.warnings

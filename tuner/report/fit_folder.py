@@ -1,6 +1,7 @@
 """Read the output folder of a fit. It may come from another version, or be incomplete."""
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +37,8 @@ _KINDS = {
     "pareto": list,
 }
 """Type of each key of metrics.json that a page reads. Every key is optional."""
+LARGEST_NUMBER = 1e100
+"""A choice: what is larger is damage, and differences of it leave double precision."""
 _OF_OBJECTS = ("per_view", "pareto", "uncertainty")
 """Keys whose members must be objects."""
 
@@ -67,6 +70,7 @@ def read_fit_folder(path: Path) -> FitFolder:
         InputError: a file cannot be read or is malformed, or a key holds a value of another type.
     """
     document = _with_present_names(read_json_object(path / METRICS))
+    _check_numbers(document, path / METRICS)
     for key, kind in _KINDS.items():
         value = document.get(key)
         if value is not None and not isinstance(value, kind):
@@ -78,6 +82,15 @@ def read_fit_folder(path: Path) -> FitFolder:
                     raise InputError(f"{path / METRICS}: key '{key}' must hold objects, got {member!r:.60}")
     images = path / IMAGES
     return FitFolder(path, document, read_view_images(images if images.exists() else path / _OLDER_IMAGES))
+
+
+def _check_numbers(value: Any, path: Path) -> None:
+    """Refuse numbers that no axis could be drawn about. What is not finite is shown as a dash."""
+    if isinstance(value, dict | list):
+        for each in value.values() if isinstance(value, dict) else value:
+            _check_numbers(each, path)
+    elif isinstance(value, int | float) and LARGEST_NUMBER < abs(value) < math.inf:
+        raise InputError(f"{path}: numbers must be at most {LARGEST_NUMBER:g}, got {value!r:.40}")
 
 
 def _with_present_names(value: Any) -> Any:

@@ -30,8 +30,7 @@ class Axis:
         """The position of `value` as a share of the axis, in [0, 1]."""
         inside = min(max(value, self.low), self.high)
         low, high, at = (self._unit(end) for end in (self.low, self.high, inside))
-        # An axis about 1e308 has no length in double precision.
-        return (at - low) / (high - low) if 0.0 < high - low < math.inf else 0.5
+        return (at - low) / (high - low)
 
     def ticks(self, about: int = 5) -> list[float]:
         """Roughly `about` round values within the axis."""

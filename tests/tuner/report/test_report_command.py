@@ -41,6 +41,7 @@ def test_what_is_no_fit_is_refused(tmp_path, capfd):
         ({"per_view": [1]}, "key 'per_view' must hold objects, got 1"),
         ({"uncertainty": {"intensity": 3}}, "key 'uncertainty' must hold objects, got 3"),
         ({"pareto": ["x"]}, "key 'pareto' must hold objects, got 'x'"),
+        ({"loss": {"curve": [1e308] * 3}}, "numbers must be at most 1e+100, got 1e+308"),
     ],
 )
 def test_a_wrong_kind_of_value_is_refused_by_its_key(fit_copy, capfd, keys, words):

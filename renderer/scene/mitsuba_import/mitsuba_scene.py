@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float64
 
-from vpltune.renderer.errors import InputError
-from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, one_line
+from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
 from vpltune.renderer.scene.files.limits import MAX_INSTANCES, DecodedBytes
 from vpltune.renderer.scene.files.plain_numbers import plain_number
+from vpltune.renderer.scene.files.reading_border import read_at_border
 from vpltune.renderer.scene.files.surface import finished_mesh
 from vpltune.renderer.scene.mitsuba_import.emitters import area_emitter, punctual_light, strongest
 from vpltune.renderer.scene.mitsuba_import.materials import MaterialReader, Surfacing
@@ -34,17 +34,7 @@ def read_mitsuba(path: str | Path) -> Scene:
         InputError: the scene is invalid or unsupported. The message is one line with file, line and cause.
     """
     path = Path(path)
-    try:
-        with np.errstate(all="ignore"):
-            return _Import(path).scene()
-    except SceneFileError as error:
-        raise InputError(one_line(f"{path}: ", 4096) + one_line(str(error))) from error
-    except RecursionError as error:
-        raise InputError(one_line(f"{path}: ", 4096) + "references are nested too deep") from error
-    except MemoryError as error:
-        raise InputError(one_line(f"{path}: ", 4096) + "does not fit into memory") from error
-    except (OverflowError, UnicodeError) as error:
-        raise InputError(one_line(f"{path}: ", 4096) + one_line(str(error))) from error
+    return read_at_border(path, lambda: _Import(path).scene())
 
 
 @dataclass(eq=False)

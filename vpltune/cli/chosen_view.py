@@ -29,7 +29,7 @@ class ChosenView:
     camera: Camera | None
     """None if no camera was given."""
     camera_name: str | None
-    """Of a camera of the file; None if none was named."""
+    """The name or number of a camera of the file; None if none was given."""
     light: Light | None
     """None if no light was given."""
     size: tuple[int, int]

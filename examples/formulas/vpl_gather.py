@@ -7,7 +7,7 @@ from examples.formulas.virtual_point_lights import Vpls
 
 LEAST_PART = 1e-4
 LEAST_RADIUS = 1e-6
-FADE_HEIGHT = 0.002
+FADE_HEIGHT = 0.01
 FACING_FADE_HEIGHT = 0.4
 
 

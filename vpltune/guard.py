@@ -22,6 +22,8 @@ PATIENCE_SECONDS = 1.5
 _ENDINGS: dict[int, str] = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 if hasattr(signal, "SIGHUP"):
     _ENDINGS[signal.SIGHUP] = "the terminal has gone"
+_MEANT = (signal.SIGINT, signal.SIGTERM)
+"""Signals that end a command even if they were ignored when it started."""
 _ASKS, _SPEAKS = b"?", b"!"
 """Words of the child: it wants to be asked to stop; it has printed its last line."""
 _SHOW_CURSOR = "\x1b[?25h"
@@ -43,9 +45,10 @@ def guarded(command: Callable[[], int], name: str) -> int:
         return command()
     signals, wake = os.pipe()
     os.set_blocking(wake, False)
-    # Signals are read from the pipe. Without a handler, Python would act on them itself. What is ignored, as
-    # under nohup, stays so.
-    heeded = [each for each in _ENDINGS if signal.getsignal(each) is not signal.SIG_IGN]
+    # Signals are read from the pipe. Without a handler, Python would act on them itself. nohup ignores that of
+    # the terminal, which stays so. A shell script ignores SIGINT for what it starts in the background; who
+    # sends it to such a command all the same means it.
+    heeded = [each for each in _ENDINGS if each in _MEANT or signal.getsignal(each) is not signal.SIG_IGN]
     for each in (*heeded, signal.SIGCHLD):
         signal.signal(each, _ignored)
     signal.set_wakeup_fd(wake)

@@ -45,9 +45,9 @@ def guarded(command: Callable[[], int], name: str) -> int:
         return command()
     signals, wake = os.pipe()
     os.set_blocking(wake, False)
-    # Signals are read from the pipe. Without a handler, Python would act on them itself. nohup ignores that of
-    # the terminal, which stays so. A shell script ignores SIGINT for what it starts in the background; who
-    # sends it to such a command all the same means it.
+    # Signals are read from the pipe. Without a handler, Python would act on them itself. nohup ignores that
+    # of the terminal, which stays so. A shell script ignores SIGINT for what it starts in the background;
+    # whoever sends it to such a command all the same means it.
     heeded = [each for each in _ENDINGS if each in _MEANT or signal.getsignal(each) is not signal.SIG_IGN]
     for each in (*heeded, signal.SIGCHLD):
         signal.signal(each, _ignored)

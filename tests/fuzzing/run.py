@@ -9,6 +9,7 @@ Exit code: 0 no findings, 1 findings, 130 interrupted.
 
 import argparse
 import importlib
+import signal
 import sys
 import time
 from collections import Counter
@@ -60,6 +61,8 @@ class Findings:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; its exit code."""
     options = _options(arguments)
+    # A script ignores it for what it starts in the background.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     _warm_up()
     if options.keep is not None:
         options.keep.mkdir(parents=True, exist_ok=True)

@@ -92,7 +92,7 @@ REFUSED = {
     "half a camera": (["render", SCENE, "-o", "a.png", "--eye", "0,0,1"], "--eye and --look-at: a camera"),
     "no config": (["render", SCENE, "-o", "a.png", "--config", "no.json"], "no.json: cannot be read"),
     "no scene": (["render", SCENE, "-o", "a.png"], "absent.glb: "),
-    "views zero": (["fit", SCENE, "-o", "out", "--views", "0"], "Invalid value for '--views'"),
+    "views zero": (["fit", SCENE, "-o", "out", "--views", "0"], "--views: must be from 1 to 64, or a file"),
     "bounces": (["fit", SCENE, "-o", "out", "--bounces", "3"], "'3' is not one of '1', 'all'"),
     "seed": (["fit", SCENE, "-o", "out", "--seed", "-1"], "Invalid value for '--seed'"),
     "export to": (["export", "default", "--to", "hlsl", "-o", "a"], "'hlsl' is not one of 'json', 'glsl'"),

@@ -183,8 +183,8 @@ def _numbers(
     if not plain or len(items) not in counts or not all(abs(item) <= LARGEST for item in items):
         wanted = " or ".join(str(count) for count in counts)
         raise InputError(
-            f"{where}: '{key}' must be {wanted} number{'s' * (counts != (1,))} of at most {LARGEST:g}, "
-            f"got {value!r:.60}"
+            f"{where}: '{key}' must be {wanted} finite number{'s' * (counts != (1,))}, got {value!r:.60}; "
+            f"at most {LARGEST:g} each"
         )
     return np.array(items, np.float64)
 

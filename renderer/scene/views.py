@@ -81,7 +81,7 @@ def views_to_json(scene_path: str, views: tuple[View, ...]) -> dict[str, Any]:
                 "name": view.name,
                 "split": view.split,
                 "size": list(view.size),
-                "camera": {"to_world": view.camera.to_world.ravel().tolist(), "yfov": view.camera.yfov},
+                "camera": camera_to_json(view.camera),
                 "lights": [light_to_json(light) for light in view.lights],
             }
             for view in views
@@ -123,15 +123,6 @@ def _views(text: str, path: str | Path) -> tuple[View, ...]:
 
 
 def _view_from_json(entry: Any, where: str) -> View:
-    camera = _member(entry, "camera", where)
-    to_world = _numbers(camera, "to_world", 16, f"{where}.camera").reshape(4, 4)
-    rotation = to_world[:3, :3]
-    # 1e-4 accepts matrices printed with five digits, and rejects scale and shear.
-    if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-4 or np.linalg.det(rotation) < 0.0:
-        raise InputError(f"{where}.camera.to_world: must be a rigid 4 × 4 matrix, row by row")
-    yfov = float(_numbers(camera, "yfov", 1, f"{where}.camera")[0])
-    if not 0.0 < yfov < math.pi:
-        raise InputError(f"{where}.camera.yfov: must lie in (0, π) radians, got {yfov}")
     size = _numbers(entry, "size", 2, where)
     if (size < 1).any() or (size > 16384).any() or (size != np.round(size)).any():
         raise InputError(f"{where}.size: must be two whole numbers from 1 to 16384, got {size.tolist()}")
@@ -145,12 +136,40 @@ def _view_from_json(entry: Any, where: str) -> View:
         name=str(_member(entry, "name", where)),
         split=split,
         size=(int(size[0]), int(size[1])),
-        camera=Camera(to_world, yfov),
-        lights=tuple(_light_from_json(light, f"{where}.lights[{i}]") for i, light in enumerate(lights)),
+        camera=camera_from_json(_member(entry, "camera", where), f"{where}.camera"),
+        lights=tuple(light_from_json(light, f"{where}.lights[{i}]") for i, light in enumerate(lights)),
     )
 
 
-def _light_from_json(entry: Any, where: str) -> Light:
+def camera_to_json(camera: Camera) -> dict[str, Any]:
+    """A camera in the form of `views.json`. World units, radians."""
+    return {"to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov}
+
+
+def camera_from_json(entry: Any, where: str) -> Camera:
+    """The camera that `camera_to_json` wrote; `where` names it in errors.
+
+    Raises:
+        InputError: a key is missing, or its value is not allowed.
+    """
+    to_world = _numbers(entry, "to_world", 16, where).reshape(4, 4)
+    rotation = to_world[:3, :3]
+    # 1e-4 accepts matrices printed with five digits, and rejects scale and shear.
+    turns = np.abs(rotation @ rotation.T - np.eye(3)).max() <= 1e-4 and np.linalg.det(rotation) > 0.0
+    if not turns or to_world[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
+        raise InputError(f"{where}.to_world: must be a rigid 4 × 4 matrix, row by row")
+    yfov = float(_numbers(entry, "yfov", 1, where)[0])
+    if not 0.0 < yfov < math.pi:
+        raise InputError(f"{where}.yfov: must lie in (0, π) radians, got {yfov}")
+    return Camera(to_world, yfov)
+
+
+def light_from_json(entry: Any, where: str) -> Light:
+    """The light that `light_to_json` wrote; `where` names it in errors.
+
+    Raises:
+        InputError: a key is missing, or its value is not allowed.
+    """
     kind = _member(entry, "type", where)
     if kind not in ("spot", "point", "directional"):
         raise InputError(f"{where}.type: must be 'spot', 'point' or 'directional', got {kind!r:.60}")

@@ -137,7 +137,7 @@ def probe_cache() -> Said:
     """The cache folder for references, which must be writable."""
     from vpltune.renderer.errors import InputError
     from vpltune.renderer.files.atomic_file import written_whole
-    from vpltune.tuner.reference.cache import cache_folder
+    from vpltune.renderer.files.cache_folder import cache_folder
 
     folder = cache_folder()
     try:

@@ -27,7 +27,7 @@ from jaxtyping import Float
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
-from vpltune.tuner.fitting.fit_placement import fit_placement
+from vpltune.tuner.fitting.fit_placement import Trace, fit_placement
 from vpltune.tuner.fitting.fit_status import Descent
 from vpltune.tuner.fitting.fit_views import robust_errors
 from vpltune.tuner.metrics.relative_squared_error import target_of, weighted_squared_error
@@ -138,6 +138,7 @@ def fit_density(
     rotations: Sequence[Rotation] | None = None,
     robust: bool = True,
     progress: Callable[[float], None] | None = None,
+    traced: Trace | None = None,
 ) -> DensityFit:
     """Fit density, falloff and visibility maps for the config's VPL count.
 
@@ -149,6 +150,7 @@ def fit_density(
         rotations: rotations to fit to; None takes `ROTATIONS` of them.
         robust: minimise the robust error (`tuner.metrics.robust_error`) if True, else relMSE.
         progress: called with the share done, in [0, 1].
+        traced: as in `fit_placement`, for each candidate.
 
     Returns:
         The candidate with the least loss, which is the start if no other is better.
@@ -169,7 +171,7 @@ def fit_density(
             if robust and errors is None:
                 # The start is measured first: its images set the scale of the robust error for all.
                 errors = robust_errors(drawn, seed=seed)
-            fit = fit_placement(drawn, parameters, errors, seed=seed)
+            fit = fit_placement(drawn, parameters, errors, seed=seed, traced=traced)
             fits[density] = fit.parameters, fit.descent
             if progress is not None:
                 progress(min(len(fits) / _TRIALS, 0.99))

@@ -29,6 +29,9 @@ from vpltune.tuner.surrogate.vpl_gather import FalloffParameters
 
 TURNS = 4
 """Default limit on the turns. A choice."""
+Trace = Callable[[ArtistParameters, float], None]
+"""Called with parameters and their cost, for someone who watches."""
+
 SETTLED = 1e-3
 """The fit has converged when a turn lowers the cost by less than this share. A choice."""
 
@@ -54,6 +57,7 @@ def fit_placement(
     visibility: Sequence[Bool[np.ndarray, "pixels vpls"]] | None = None,
     turns: int = TURNS,
     progress: Callable[[float], None] | None = None,
+    traced: Trace | None = None,
 ) -> PlacementFit:
     """Fit to the references of views, which all count the same.
 
@@ -65,6 +69,7 @@ def fit_placement(
         visibility: for each view, whether each VPL is visible from each pixel with a surface; replaces maps.
         turns: limit on the reweighting iterations.
         progress: called with the share done, in [0, 1].
+        traced: called with the start and its cost, and with those of every turn.
 
     Returns:
         The best parameters met: those of the start with the status `NO_IMPROVEMENT` if none are better, or
@@ -75,6 +80,8 @@ def fit_placement(
     current, tables = start, [each.table(start) for each in pixels]
     ready = [each.ready(table, None) for each, table in zip(pixels, tables, strict=True)]
     costs, found, maps_move = [_cost(ready, errors, start)], [start], True
+    if traced is not None:
+        traced(start, costs[0])
     for turn in range(turns):
         if errors is not None:
             ready = [
@@ -95,6 +102,8 @@ def fit_placement(
                 ]
         costs.append(_cost(ready, errors, current))
         found.append(current)
+        if traced is not None:
+            traced(current, costs[-1])
         if progress is not None:
             progress((turn + 1) / turns)
         if costs[-2] - costs[-1] <= SETTLED * abs(costs[-1]):

@@ -15,12 +15,12 @@ from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
+from vpltune.renderer.files.cache_folder import cache_folder
 from vpltune.renderer.frame.rsm_resolution import rsm_resolution
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.gpu.shader_library import shaders_digest
 from vpltune.renderer.scene.scene import Scene
 from vpltune.renderer.scene.views import View
-from vpltune.tuner.reference.cache import cache_folder
 from vpltune.tuner.reference.content_key import scene_digest
 
 COUNTS = (32, 256)

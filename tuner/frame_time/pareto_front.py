@@ -17,9 +17,9 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
+from vpltune.renderer.files.cache_folder import cache_folder
 from vpltune.tuner.fitting.fit_status import Descent, FitStatus
 from vpltune.tuner.frame_time.frame_budget import BudgetFit, FrameBudget, Progress, SettledFrame
-from vpltune.tuner.reference.cache import cache_folder
 
 POINTS = 6
 """Number of budgets. A choice."""

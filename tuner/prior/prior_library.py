@@ -18,6 +18,7 @@ from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.scene_statistics import STATISTIC_NAMES
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.atomic_file import written_whole
+from vpltune.renderer.files.cache_folder import cache_folder
 from vpltune.renderer.frame.runtime import DEFAULT_OPTIONS, Runtime
 from vpltune.renderer.frame.visibility_map_layout import VisibilityMapLayout
 from vpltune.renderer.scene.placement import views_for_scene
@@ -32,7 +33,6 @@ from vpltune.tuner.prior.loss_table import (
     loss_table,
 )
 from vpltune.tuner.reference import ReferenceView, reference_views
-from vpltune.tuner.reference.cache import cache_folder
 from vpltune.tuner.reference.content_key import scene_digest
 from vpltune.tuner.surrogate.captured_view import CapturedView
 

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import platformdirs
 
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import written_whole
+from vpltune.renderer.files.cache_folder import cache_folder
 from vpltune.tuner.reference.reference_view import ReferenceView
 
 SIZE_LIMIT = 2 * 2**30
@@ -30,12 +30,6 @@ _SUFFIX = ".reference"  # file name extension of a cache entry
 _DIGEST_BYTES = 32  # length of a SHA-256 digest
 _log = logging.getLogger(__name__)
 _stored_bytes = 0
-
-
-def cache_folder() -> Path:
-    """The folder that the environment variable VPLTUNE_CACHE names, else vpltune's in the user's cache."""
-    named = os.environ.get("VPLTUNE_CACHE")
-    return Path(named) if named else Path(platformdirs.user_cache_dir("vpltune", appauthor=False))
 
 
 def load(key: str) -> ReferenceView | None:

@@ -25,7 +25,8 @@ from typing import Literal
 
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
-from vpltune.tuner.reference.cache import cache_folder, locked
+from vpltune.renderer.files.cache_folder import cache_folder
+from vpltune.tuner.reference.cache import locked
 
 _log = logging.getLogger(__name__)
 

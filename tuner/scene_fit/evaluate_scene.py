@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Any
 
 from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.files.cache_folder import cache_folder
 from vpltune.renderer.scene.views import write_views
 from vpltune.tuner.evaluation.error_breakdown import error_breakdown
 from vpltune.tuner.evaluation.evaluate import Evaluation, evaluate
 from vpltune.tuner.evaluation.prepare_scene import Progress, SceneOptions, Stopwatch, prepare_scene
-from vpltune.tuner.reference.cache import cache_folder
 from vpltune.tuner.reference.content_key import scene_digest
 from vpltune.tuner.scene_fit.fit_scene import default_like
 

@@ -32,6 +32,7 @@ from vpltune.tuner.evaluation.prepare_scene import (
 from vpltune.tuner.evaluation.validation import candidates, validation_metrics
 from vpltune.tuner.evaluation.view_images import write_view_images
 from vpltune.tuner.fitting.fit_density import FEW_VPLS, table_rotations
+from vpltune.tuner.fitting.fit_placement import Trace
 from vpltune.tuner.fitting.fit_status import Descent, FitStatus, Outcome
 from vpltune.tuner.fitting.search_space import SearchSpace
 from vpltune.tuner.frame_time.fit_budget import BudgetOptions
@@ -57,6 +58,8 @@ class FitOptions(SceneOptions):
     """Picks VPL count and quality settings that meet a frame time (`tuner.frame_time.fit_budget`)."""
     motion: bool = False
     """Accepts only a result that flickers no more than the start when lights move."""
+    traced: Trace | None = None
+    """Called with parameters that the search tried and their cost, for someone who watches."""
     command: str | None = None
     """The command line, for the provenance in metrics.json; None if the fit was called from Python."""
 
@@ -245,6 +248,7 @@ def _judged(
             budget=options.budget,
             seed=options.seed,
             progress=lambda share: progress("fit", share),
+            traced=options.traced,
         )
     baseline = replace(
         start,

@@ -11,7 +11,7 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene
 from vpltune.tuner.fitting.choose_placement import choose_placement
 from vpltune.tuner.fitting.fit_density import FEW_VPLS, density_document, fit_density, with_discs
-from vpltune.tuner.fitting.fit_placement import fit_placement, ready_views
+from vpltune.tuner.fitting.fit_placement import Trace, fit_placement, ready_views
 from vpltune.tuner.fitting.fit_status import Descent
 from vpltune.tuner.fitting.fit_views import robust_errors
 from vpltune.tuner.fitting.search_space import SearchSpace
@@ -46,6 +46,7 @@ def search(
     budget: BudgetOptions | None,
     seed: int,
     progress: Callable[[float], None],
+    traced: Trace | None = None,
 ) -> Search:
     """Search for the best parameters on the fitted views.
 
@@ -56,6 +57,7 @@ def search(
         budget: pick VPL count and quality settings that meet a frame time; overrides the start's.
         seed: selects pixels and rotations.
         progress: called with the share done, in [0, 1].
+        traced: called with parameters that were tried and their cost; not within a budget.
 
     Raises:
         InputError: no frame meets the budget.
@@ -66,7 +68,7 @@ def search(
         start = replace(start, quality=met.quality)
         return _recaptured(prepared, views, start, met.parameters, descent, found, seed)
     if start.parameters.vpl_count <= FEW_VPLS:
-        fit = fit_density(prepared.runtime, views, start, seed=seed, progress=progress)
+        fit = fit_density(prepared.runtime, views, start, seed=seed, progress=progress, traced=traced)
         found = {"density": density_document(prepared.runtime, views, start, fit, seed)}
         return _recaptured(prepared, views, start, fit.parameters, fit.descent, found, seed)
     errors = robust_errors(views, seed=seed)
@@ -84,6 +86,7 @@ def search(
         errors,
         seed=seed,
         progress=lambda share: progress(0.6 + 0.3 * share),
+        traced=traced,
     )
     prior = replace(
         placed.parameters,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import jax
 
-from vpltune.tuner.reference.cache import cache_folder
+from vpltune.renderer.files.cache_folder import cache_folder
 
 LEAST_SECONDS = 0.02
 """Functions that compile faster than this are not cached. A choice: they are not worth a file."""

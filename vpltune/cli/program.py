@@ -42,6 +42,7 @@ from vpltune.cli.report import (
 from vpltune.cli.report_page import report
 from vpltune.cli.train_prior import train_prior
 from vpltune.cli.verbosity import choose_verbosity, detail, is_verbose, one_line, reset_verbosity
+from vpltune.cli.view import view
 from vpltune.guard import last_line_printed
 from vpltune.renderer.errors import InputError, MachineError
 
@@ -68,6 +69,7 @@ COMMANDS = {
     "bench": bench,
     "import": import_scene,
     "init": init,
+    "view": view,
 }
 for name, command in COMMANDS.items():
     # Benchmarks are not part of the installed package.

@@ -151,8 +151,8 @@ def _write_layer(
     bouncing: "BouncingLights | None",
 ) -> "ArtistParameters":
     """Write one image, and return the parameters that it was drawn with."""
-    from vpltune.cli.layer_display import for_display
     from vpltune.renderer.files.image_file import write_exr, write_png
+    from vpltune.renderer.frame.layer_display import for_display
     from vpltune.renderer.scene.dynamic_lights import DynamicLights
 
     lights = None if bouncing is None else DynamicLights(bouncing.records)

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
-from vpltune.cli.layer_display import for_display
 from vpltune.cli.options import Layer
 from vpltune.cli.progress_display import shown_progress
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.video_file import clip_writer
 from vpltune.renderer.frame.clip_state import ClipState
+from vpltune.renderer.frame.layer_display import for_display
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.dynamic_lights import DynamicLights
 from vpltune.renderer.scene.light_motion import BouncingLights

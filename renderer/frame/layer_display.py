@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from vpltune.cli.options import Layer
 from vpltune.renderer.files.srgb import srgb_from_linear
-from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.frame.runtime import Layer, Runtime
 
 
 def for_display(

@@ -1,5 +1,6 @@
 // --- what can be copied and saved: parameters, camera and lights as they are. Follows page.js in one script. ------
-// A number as Python's `repr` writes it, which the checksum is taken of; whole numbers without a fraction.
+// A number as Python reads it from JSON text and writes it anew for the checksum: whole ones without a fraction, others
+// by `repr`. Whole numbers from 2⁵³ on, which only free-form keys have, were rounded when the page was read.
 function canonicalNumber(value) {
   if (Number.isInteger(value)) return Math.abs(value) < 1e21 ? String(value) : BigInt(value).toString();
   return Math.abs(value) < 1e-4 ? value.toExponential().replace(/e-(\d)$/, "e-0$1") : String(value);

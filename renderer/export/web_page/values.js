@@ -71,6 +71,7 @@ async function copy(text) {
     field.hidden = false;
     field.focus();
     field.select();
-    return "The browser denies the clipboard. The text is selected: copy it with Ctrl+C.";
+    field.scrollTop = 0;
+    return "The browser denies the clipboard. The text is selected: copy it with Ctrl+C or ⌘C.";
   }
 }

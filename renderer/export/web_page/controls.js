@@ -1,5 +1,4 @@
-// --- the page's controls: buttons, sliders, keys and pointer. Follows frame.js in one script. ---------------------
-const element = (id) => document.getElementById(id);
+// --- the page's controls: buttons, sliders, keys and pointer. The last file of the script. -----------------------
 // The parameters that have a slider.
 const LIVE = ["intensity", "falloff_footprint", "extinction_coefficient", "density_exponent"];
 
@@ -7,6 +6,7 @@ const LIVE = ["intensity", "falloff_footprint", "extinction_coefficient", "densi
 class Page {
   constructor(frame) {
     this.frame = frame;
+    this.surfaces = new Surfaces(frame.scene, EYE_MARGIN * bundle.diagonal);
     this.exposure = null;  // measured once the image is complete
     this.chosenLight = 0;
     this.waiting = [];     // promises to resolve when the image is complete
@@ -18,15 +18,18 @@ class Page {
 
   // The exported camera, lights and parameters.
   reset() {
-    this.camera = clone(bundle.view.camera_to_world);
+    this.orbit = new OrbitCamera(this.surfaces, bundle.view.camera_to_world);
     this.lights = clone(bundle.lights);
     this.faces = clone(bundle.rsm.faces);
-    const middle = add(center, column(this.camera, 3), -1);
-    this.distance = Math.max(-dot(middle, column(this.camera, 2)), 0.05 * bundle.diagonal);
     element("exposure").value = 0;
     this.showExposure();
     this.exposure = null;
     this.choose(tunedParameters, "tuned");
+  }
+
+  // From camera to world, rigid.
+  get camera() {
+    return this.orbit.to_world;
   }
 
   // Use a set of parameters, with the export's VPL count, so that tuned and default cost the same.
@@ -42,6 +45,9 @@ class Page {
     this.lightChanged = this.lightChanged || light;
     this.cameraChanged = this.cameraChanged || camera || light;
     this.gathered = 0;
+    // What was copied or shown is no longer how things are.
+    element("values-text").hidden = true;
+    element("values-status").textContent = "";
     if (!this.asked) this.asked = requestAnimationFrame(() => this.step());
   }
 
@@ -73,22 +79,15 @@ class Page {
     return this.asked ? new Promise((resolve) => this.waiting.push(resolve)) : Promise.resolve();
   }
 
-  // Turn the camera about the point that it looks at [radians].
-  orbit(yaw, pitch) {
-    const pivot = add(column(this.camera, 3), column(this.camera, 2), -this.distance);
-    const up = column(this.camera, 2)[1] * Math.sign(-pitch);
-    this.camera = turned(this.camera, pivot, [0, 1, 0], yaw);
-    // Stop before the pole, where the image would flip.
-    if (up > -0.98) this.camera = turned(this.camera, pivot, column(this.camera, 0), pitch);
+  // Turn the camera about its pivot [radians].
+  turn(yaw, pitch) {
+    this.orbit.turnBy(yaw, pitch);
     this.change({ camera: true });
   }
 
   // Multiply the camera's distance from its pivot.
   approach(factor) {
-    const step = this.distance * (1 - factor);
-    const moved = add(column(this.camera, 3), column(this.camera, 2), -step);
-    moved.forEach((value, i) => { this.camera[i][3] = value; });
-    this.distance *= factor;
+    this.orbit.approach(factor);
     this.change({ camera: true });
   }
 
@@ -115,8 +114,9 @@ class Page {
       const onScale = spec.scale === "log" ? Math.log : (value) => value;
       Object.assign(slider, { type: "range", id: spec.name, min: onScale(spec.low), max: onScale(spec.high), step: "any" });
       slider.addEventListener("input", () => {
-        const value = slider.valueAsNumber;
-        this.parameters[spec.name] = spec.scale === "log" ? Math.exp(value) : value;
+        const value = spec.scale === "log" ? Math.exp(slider.valueAsNumber) : slider.valueAsNumber;
+        // Rounding may step over a bound, and readers of configs are strict.
+        this.parameters[spec.name] = Math.min(Math.max(value, spec.low), spec.high);
         output.textContent = this.parameters[spec.name].toPrecision(3);
         for (const id of ["tuned", "default"]) element(id).setAttribute("aria-pressed", "false");
         this.change({ light: spec.name === "density_exponent" });
@@ -171,10 +171,16 @@ class Page {
     element("tuned").addEventListener("click", tuned);
     element("default").addEventListener("click", plain);
     element("reset").addEventListener("click", () => this.reset());
+    element("copy").addEventListener("click", async () => {
+      const { parameters, lights } = this;
+      element("values-status").textContent = await copy(jsonText({ parameters, lights }));
+    });
+    element("save-config").addEventListener("click", async () => save("tuned.json", await tunedConfig(this.parameters)));
+    element("save-views").addEventListener("click", () => save("views.json", viewsFile(this.camera, this.lights)));
     const brighten = (stops) => { exposure.value = exposure.valueAsNumber + stops; expose(); };
     const keys = {
-      ArrowLeft: () => this.orbit(-0.05, 0), ArrowRight: () => this.orbit(0.05, 0),
-      ArrowUp: () => this.orbit(0, -0.05), ArrowDown: () => this.orbit(0, 0.05),
+      ArrowLeft: () => this.turn(-0.05, 0), ArrowRight: () => this.turn(0.05, 0),
+      ArrowUp: () => this.turn(0, -0.05), ArrowDown: () => this.turn(0, 0.05),
       "+": () => this.approach(0.93), "=": () => this.approach(0.93), "-": () => this.approach(1.07),
       a: () => this.moveLight(-0.02, 0, 0), d: () => this.moveLight(0.02, 0, 0),
       w: () => this.moveLight(0, 0.02, 0), s: () => this.moveLight(0, -0.02, 0),
@@ -184,8 +190,9 @@ class Page {
     };
     document.addEventListener("keydown", (event) => {
       const action = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
-      // A focused slider uses the arrow keys itself.
-      if (!action || event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === "INPUT") return;
+      // A focused slider or text uses the arrow keys itself.
+      const field = ["INPUT", "TEXTAREA"].includes(event.target.tagName);
+      if (!action || event.ctrlKey || event.metaKey || event.altKey || field) return;
       event.preventDefault();
       action();
     });
@@ -194,7 +201,7 @@ class Page {
       if (!canvas.hasPointerCapture(event.pointerId)) return;
       const [x, y] = [event.movementX / canvas.clientWidth, event.movementY / canvas.clientHeight];
       if (event.shiftKey) this.moveLight(x, -y, 0);
-      else this.orbit(-4 * x, -3 * y);
+      else this.turn(-4 * x, -3 * y);
     });
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();

@@ -1,7 +1,7 @@
 "use strict";
 // The renderer of the exported page, in WebGL 2. It draws what the runtime draws: G-buffer, RSM, VPLs, gather, direct
 // light, tone curve. Reads three elements of the page: `bundle` (the document), `binary` (its arrays) and `shaders`
-// (sources from shaders/web/). Owner: web_page.py. The frame is in frame.js, the page's controls in controls.js.
+// (sources from shaders/web/). Owner: web_page.py, which joins the files of one page.
 //
 // VPLs are drawn again only when a light moves, or, with VPL importance, when the camera moves. Each animation frame
 // gathers one batch of VPLs, so that the page stays responsive on a slow machine.
@@ -11,6 +11,7 @@ const shaders = JSON.parse(document.getElementById("shaders").textContent);
 // A config file keeps the number of Lloyd iterations with its quality settings.
 const { lloyd_iterations } = bundle.config.quality;
 const tunedParameters = { ...bundle.config.parameters, lloyd_iterations };
+const element = (id) => document.getElementById(id);
 const BATCH = 32;  // VPLs gathered in one animation frame; a choice
 const FULLSCREEN = "web/fullscreen.vert";
 

@@ -28,6 +28,7 @@ _TREE_DEPTH = 60
 
 NOTE = "One bounce of indirect light from virtual point lights, drawn live in this page"
 
+_SCRIPTS = ("page.js", "frame.js", "surfaces.js", "camera.js", "values.js", "controls.js")
 _SHADERS = (
     "web/fullscreen.vert",
     "web/scene.vert",
@@ -75,18 +76,19 @@ def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
     defines = _defines(drawn)
     binary = bundle.binary
     arrays = {name: at for name, at in bundle.document["arrays"].items() if name not in ("lights", "faces")}
-    if defines["VISIBILITY_MAP_SIZE"]:
-        defines["RAY_ROOT"], trees = _ray_tree(bundle)
-        for name, values in trees.items():
-            content = values.tobytes()
-            arrays[name] = {"offset": len(binary), "bytes": len(content)}
-            binary += content
+    # The camera, too, moves by this tree.
+    defines["RAY_ROOT"], trees = _ray_tree(bundle)
+    for name, values in trees.items():
+        content = values.tobytes()
+        arrays[name] = {"offset": len(binary), "bytes": len(content)}
+        binary += content
     document = drawn | {
         "vpl_columns": VPL_COLUMNS,
         "data_columns": DATA_COLUMNS,
         "note": ". ".join([NOTE, *left_out]) + ".",
         "table": _table(),
         "arrays": arrays,
+        "ray_tree": {"root": defines["RAY_ROOT"], "count_bits": COUNT_BITS},
     }
     parts = {
         "TITLE": html.escape(f"{bundle.document['scene']} – VPLtune"),
@@ -94,7 +96,7 @@ def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
         "DOCUMENT": _json(document),
         "BINARY": base64.b64encode(zlib.compress(binary, 9)).decode("ascii"),
         "SHADERS": _json(_shaders(drawn, defines)),
-        "SCRIPT": _text("page.js") + _text("frame.js") + _text("controls.js"),
+        "SCRIPT": "".join(_text(name) for name in _SCRIPTS),
     }
     page = _text("page.html")
     # Piece by piece from the template's own places: what is put in is never looked into.

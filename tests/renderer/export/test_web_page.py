@@ -1,18 +1,15 @@
 """The exported page in a real browser: the runtime's image, moved by keys and pointer, nothing fetched."""
 
-import base64
 import dataclasses
-import io
 import json
 import re
 import runpy
 
 import numpy as np
 import pytest
-from built_scenes import ROOM_LIGHTS, colored_room, room_view
+from built_scenes import ROOM_LIGHTS, colored_room
 from exported_frames import CONFIG, READER, SCENES, textured_room, with_parameters, with_resolution
-from headless_chromium import headless_chromium
-from PIL import Image
+from exported_page import image_of, page_text, web_view
 
 from vpltune import Runtime
 from vpltune.cli.program import run
@@ -28,7 +25,6 @@ from vpltune.renderer.scene.scene import Camera
 from vpltune.renderer.scene.sun_faces import SunGrid
 from vpltune.tuner.fitting.fit_density import DISC_FOOTPRINT
 
-SOFTWARE_GL = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 CELLS = with_parameters(
     CONFIG.seen_by("maps"), vpl_count=32, lloyd_iterations=2, falloff_footprint=DISC_FOOTPRINT
 )
@@ -44,56 +40,6 @@ READ_TARGET = """name => {
     return Array.from(texels);
   });
 }"""
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with headless_chromium(*SOFTWARE_GL) as browser:
-        yield browser
-
-
-@pytest.fixture
-def opened(browser, tmp_path):
-    """Opens a page's text as a file, and hands back the browser's page once the image is whole."""
-    pages, asked, complaints = [], [], []
-
-    def open_page(text, **options):
-        path = tmp_path / "page.html"
-        path.write_text(text, encoding="utf-8")
-        page = browser.new_page(**options)
-        pages.append(page)
-        page.on("request", lambda request: asked.append(request.url))
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("console", lambda message: message.type == "error" and complaints.append(message.text))
-        page.goto(path.as_uri())
-        page.evaluate("window.started")
-        return page
-
-    yield open_page
-    for page in pages:
-        page.close()
-    assert complaints == []
-    # The page itself, and not one thing more; its icon is inside.
-    assert [url for url in asked if not url.startswith(("file://", "data:"))] == []
-    assert len([url for url in asked if url.startswith("file://")]) == len(pages)
-
-
-def web_view(light, size=(96, 72)):
-    """A view of the room in which no edge runs along a row or a column of pixel centres."""
-    view = room_view(light, size)
-    to_world = view.camera.to_world.copy()
-    to_world[:3, 3] += 0.03, 0.0071, 0.0
-    return dataclasses.replace(view, camera=Camera(to_world, view.camera.yfov))
-
-
-def image_of(page):
-    page.evaluate("vpltune.finished()")
-    encoded = page.evaluate("document.getElementById('image').toDataURL('image/png')").split(",")[1]
-    return np.asarray(Image.open(io.BytesIO(base64.b64decode(encoded))).convert("RGB")).astype(int)
-
-
-def page_text(scene, view, config=CONFIG):
-    return web_page(scene_bundle(scene, view, config), left_out(config, view.size))
 
 
 def default_of(config):

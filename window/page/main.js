@@ -40,10 +40,10 @@ const connection = new Connection({
   opened: (open) => {
     const lost = model.connected && !open;
     model.connected = open;
-    byId("lost", HTMLElement).hidden = open || (!lost && !model.scene);
+    byId("lost", HTMLElement).hidden = open;
     if (lost) {
       picks.clear();
-      images.clear();
+      images.forget();
       model.pending.clear();
     }
     model.changed("connection", "image");

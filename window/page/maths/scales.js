@@ -8,9 +8,12 @@
 const STEP = 0.01;
 const FINE_STEP = 0.001;
 
+/** Significant digits of a value that is set here: as many as are shown, so that a file holds what was seen. */
+const DIGITS = 4;
+
 /** @param {Range} range @param {number} value @returns {number} within the range, whole where it must be */
 export function allowed(range, value) {
-  const rounded = range.whole ? Math.round(value) : value;
+  const rounded = range.whole ? Math.round(value) : Number(value.toPrecision(DIGITS));
   return Math.max(range.low, Math.min(range.high, rounded));
 }
 
@@ -54,7 +57,7 @@ export function rangeOfBounds(low, high) {
 
 /** A number with at most `digits` significant digits, without trailing zeros.
  * @param {number} value @param {number} [digits] */
-export function formatted(value, digits = 4) {
+export function formatted(value, digits = DIGITS) {
   if (value === 0 || !Number.isFinite(value)) return String(value || 0);
   const size = Math.abs(value);
   if (size >= 1e7 || size < 1e-5) return value.toExponential(2);

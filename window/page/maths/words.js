@@ -3,11 +3,19 @@
  */
 import { formatted } from "./scales.js";
 
+/** Terms that are not written in small letters. @type {Record<string, string>} */
+const SPELLED = {
+  vpl: "VPL",
+  vpls: "VPLs",
+  rsm: "RSM",
+  flip: "FLIP",
+  lloyd: "Lloyd",
+  "g buffer": "G-buffer",
+};
+
 /** "falloff_footprint" → "falloff footprint"; "vpl_count" → "VPL count". @param {string} name */
 export const humanised = (name) =>
-  name
-    .replaceAll("_", " ")
-    .replace(/\b(vpls?|rsm|flip)\b/gi, (word) => (/^vpls$/i.test(word) ? "VPLs" : word.toUpperCase()));
+  name.replaceAll("_", " ").replace(/\b(?:vpls?|rsm|flip|lloyd|g buffer)\b/g, (word) => SPELLED[word]);
 
 /** The same with a capital. @param {string} name */
 export function titled(name) {

@@ -13,7 +13,6 @@ export function animationBar(model, looks) {
   const slider = byId("seconds", HTMLInputElement);
   const play = byId("play", HTMLButtonElement);
   const rest = byId("rest-pose", HTMLButtonElement);
-  let playing = false;
 
   const goTo = (/** @type {number | null} */ seconds) => {
     model.viewing.seconds = seconds;
@@ -23,13 +22,16 @@ export function animationBar(model, looks) {
   const toggle = () => {
     const length = model.scene?.seconds ?? 0;
     if (!(length > 0)) return;
-    playing = !playing;
+    looks.playing = !looks.playing;
     model.changed("viewing");
-    if (!playing) return;
+    if (!looks.playing) {
+      looks.input();
+      return;
+    }
     const begin = performance.now() / 1000 - (model.viewing.seconds ?? 0);
     let asked = -1;
     const frame = () => {
-      if (!playing) return;
+      if (!looks.playing) return;
       // The next time is asked for once the image of the last one is there: time is real, frames are as many
       // as the server draws.
       if ((model.shown.a?.header.look ?? -1) >= asked && model.connected) {
@@ -42,11 +44,11 @@ export function animationBar(model, looks) {
   };
   play.addEventListener("click", toggle);
   slider.addEventListener("input", () => {
-    playing = false;
+    looks.playing = false;
     goTo(Number(slider.value));
   });
   rest.addEventListener("click", () => {
-    playing = false;
+    looks.playing = false;
     goTo(null);
   });
   model.on(["scene", "viewing"], () => {
@@ -62,12 +64,12 @@ export function animationBar(model, looks) {
       seconds === null ? "rest pose" : `${clock(seconds)} / ${clock(length)}`,
     );
     setAttribute(rest, "aria-pressed", String(seconds === null));
-    setAttribute(play, "aria-label", playing ? "Stop" : "Play");
-    play.title = playing ? "Stop (space)" : "Play (space)";
+    setAttribute(play, "aria-label", looks.playing ? "Stop" : "Play");
+    play.title = looks.playing ? "Stop (space)" : "Play (space)";
     setAttribute(
       /** @type {Element} */ (play.querySelector("use")),
       "href",
-      playing ? "#icon-stop" : "#icon-play",
+      looks.playing ? "#icon-stop" : "#icon-play",
     );
   });
   return toggle;

@@ -57,7 +57,7 @@ export function fileMenu(model, edits, connection) {
     document.title = `${unsaved ? "● " : ""}${scene ? `${scene.name} – ` : ""}VPLtune`;
     setText(byId("scene-name", HTMLElement), scene?.name ?? "");
     byId("scene-name", HTMLElement).title = scene?.path ?? "";
-    byId("unsaved", HTMLElement).hidden = !unsaved;
+    byId("unsaved", HTMLElement).classList.toggle("on", unsaved);
     byId("unsaved-config", HTMLElement).hidden = !state?.unsaved;
     byId("unsaved-sidecar", HTMLElement).hidden = !state?.unsaved_lights;
     for (const type of /** @type {const} */ (["undo", "redo"])) {

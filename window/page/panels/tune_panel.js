@@ -47,6 +47,7 @@ export function tunePanel(model, connection) {
             .filter(Boolean)
             .join("  ·  "),
     );
+    /** @type {HTMLElement} */ (byId("fit-stage").parentElement).hidden = !running;
     const losses = fit?.losses ?? [];
     setAttribute(byId("loss-line", SVGElement), "points", lossPoints(losses, PLOT_WIDTH, PLOT_HEIGHT));
     setText(

@@ -38,9 +38,18 @@ function name(model, pane) {
     : SOURCE_NAMES[source];
 }
 
+/** Why a pane is empty, or "". @param {Model} model @param {Pane} pane */
+function emptyWords(model, pane) {
+  if (!model.viewing[pane]) return "";
+  if (!model.scene) return "Waiting for the scene…";
+  const shown = model.shown[pane];
+  if (!shown) return "Waiting for the image…";
+  if (shown.bitmap) return "";
+  return `The reference of this view is at ${percent(shown.header.share ?? 0)}. The error is shown once it is there.`;
+}
+
 /** @param {Model} model */
 export function paneLabels(model) {
-  const empty = byId("stage-message", HTMLElement);
   const update = () => {
     for (const pane of /** @type {const} */ (["a", "b"])) {
       const label = byId(`label-${pane}`, HTMLElement);
@@ -52,22 +61,15 @@ export function paneLabels(model) {
       const share = header?.source === model.viewing[pane] ? header?.share : undefined;
       bar.hidden = share === undefined || share >= 1;
       bar.style.setProperty("--share", String(share ?? 0));
+      const message = byId(`message-${pane}`, HTMLElement);
+      setText(message, emptyWords(model, pane));
+      message.hidden = message.textContent === "";
+      const left = model.viewing.b ? model.viewing.split : 1;
+      message.style.setProperty("--wide", String(pane === "a" ? left : 1 - left));
     }
     const { a, b } = model.viewing;
     byId("key-signed_error", HTMLElement).hidden = a !== "signed_error" && b !== "signed_error";
     byId("key-flip", HTMLElement).hidden = a !== "flip" && b !== "flip";
-    const waiting = model.shown.a;
-    setText(
-      empty,
-      !model.scene
-        ? "Waiting for the scene…"
-        : !waiting
-          ? "Waiting for the first image…"
-          : waiting.bitmap
-            ? ""
-            : `The reference of this view is at ${percent(waiting.header.share ?? 0)}. The error is shown once it is there.`,
-    );
-    empty.hidden = empty.textContent === "";
   };
   model.on(["image", "viewing", "scene", "state"], update);
 }

@@ -42,12 +42,8 @@ export class Images {
     this.#undrawn = [];
   }
 
-  /** Forgets the images: those of another scene, or of a connection that is gone. */
-  clear() {
+  /** Nobody waits for acknowledgements any more. */
+  forget() {
     this.#undrawn = [];
-    for (const pane of /** @type {const} */ (["a", "b"])) {
-      this.model.shown[pane]?.bitmap?.close();
-      this.model.shown[pane] = null;
-    }
   }
 }

@@ -12,6 +12,7 @@ const SETTLED_AFTER = 200;
 export class Looks {
   /** Number of the newest look. */ number = 0;
   /** Size of the canvas in device pixels. @type {[number, number]} */ size = [0, 0];
+  /** While the animation plays, a slow frame is no pause. */ playing = false;
   #scheduled = false;
   /** @type {number | undefined} */ #timer;
 
@@ -48,13 +49,16 @@ export class Looks {
     const was = model.moving;
     model.moving = true;
     clearTimeout(this.#timer);
-    this.#timer = setTimeout(() => {
-      model.moving = false;
-      model.changed("image");
-      this.send();
-    }, SETTLED_AFTER);
+    this.#timer = setTimeout(() => this.#settle(), SETTLED_AFTER);
     if (!was) model.changed("image");
     return was;
+  }
+
+  #settle() {
+    if (this.playing) return;
+    this.model.moving = false;
+    this.model.changed("image");
+    this.send();
   }
 
   #sendNow() {

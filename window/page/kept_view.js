@@ -9,29 +9,32 @@ const WRITE_AFTER = 300;
 
 /** @param {Model} model */
 export function keptView(model) {
-  let path = "";
+  /** @type {string | null} */
+  let key = null;
   let timer = 0;
-  const write = () => sessionStorage.setItem(`vpltune view ${path}`, JSON.stringify(model.viewing));
+  const write = () => sessionStorage.setItem(`vpltune view ${key}`, JSON.stringify(model.viewing));
   model.on(["viewing"], () => {
-    if (!path || timer) return;
+    if (key === null || timer) return;
     timer = setTimeout(() => {
       timer = 0;
       write();
     }, WRITE_AFTER);
   });
-  addEventListener("pagehide", () => path && write());
+  addEventListener("pagehide", () => key !== null && write());
   return {
     /** Takes up what was looked at in the scene that has just arrived, or its start. @returns {boolean} whether
      * it is another scene than before */
     begin() {
       const { scene, viewing } = model;
       if (!scene) return false;
-      const another = scene.path !== path;
-      path = scene.path;
+      // A scene in memory has no path.
+      const next = scene.path ?? scene.name;
+      const another = next !== key;
+      key = next;
       if (another) {
         viewing.camera = scene.camera;
         viewing.seconds = null;
-        Object.assign(viewing, JSON.parse(sessionStorage.getItem(`vpltune view ${path}`) ?? "{}"));
+        Object.assign(viewing, JSON.parse(sessionStorage.getItem(`vpltune view ${key}`) ?? "{}"));
       }
       if (!scene.layers.includes(viewing.layer)) viewing.layer = scene.layers[0] ?? "";
       if (viewing.seconds !== null && !(scene.seconds >= viewing.seconds)) viewing.seconds = null;

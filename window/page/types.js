@@ -4,7 +4,7 @@
  * @typedef {[number, number, number]} Vector
  * @typedef {{to_world: number[], yfov: number}} Camera  16 numbers row by row; radians
  * @typedef {"spot" | "point" | "directional"} LightType
- * @typedef {{type: LightType, position: Vector, direction: Vector, intensity: Vector,
+ * @typedef {{name?: string, type: LightType, position: Vector, direction: Vector, intensity: Vector,
  *   inner_cone: number, outer_cone: number}} Light
  * @typedef {"default" | "tuned" | "hand" | "auto" | "reference" | "signed_error" | "flip"} Source
  * @typedef {"default" | "tuned" | "hand" | "auto"} ConfigSource
@@ -14,7 +14,7 @@
  * @typedef {number | string | null} QualityValue
  * @typedef {{name: string, meaning: string, choices?: QualityValue[], low?: number, high?: number}} Quality
  * @typedef {{config: string, sidecar: string, views: string}} Paths
- * @typedef {{name: string, path: string, bounds: [Vector, Vector], seconds: number, parameters: Parameter[],
+ * @typedef {{name: string, path: string | null, bounds: [Vector, Vector], seconds: number, parameters: Parameter[],
  *   qualities: Quality[], layers: string[], renderer: string, camera: Camera, tuning: string | null,
  *   paths: Paths}} Scene
  * @typedef {{parameters: Record<string, number>, quality: Record<string, QualityValue>,
@@ -23,8 +23,8 @@
  * @typedef {{running: boolean, stage: string, share: number, seconds_left: number | null, losses: number[],
  *   parameters: Record<string, number> | null, status: string, sentence: string}} Fit
  * @typedef {{configs: Record<ConfigSource, Config | null>, lights: Light[], views: KeptView[],
- *   unsaved: boolean, unsaved_lights: boolean, can_undo: boolean, can_redo: boolean, undo_name: string,
- *   redo_name: string, budget_ms: number | null, fit: Fit}} State
+ *   unsaved: boolean, unsaved_lights: boolean, can_undo: boolean, can_redo: boolean, undo_name: string | null,
+ *   redo_name: string | null, budget_ms: number | null, fit: Fit}} State
  * @typedef {{id: number, position: Vector | null, normal: Vector, distance: number}} Picked
  * @typedef {{source: Source, passes: [string, number][], milliseconds: number}} Timings
  * @typedef {{pane: Pane, source: Source, look: number, size: [number, number], settled: boolean,

@@ -56,7 +56,7 @@ export function fileMenu(model, edits, connection) {
     const unsaved = Boolean(state?.unsaved || state?.unsaved_lights);
     document.title = `${unsaved ? "● " : ""}${scene ? `${scene.name} – ` : ""}VPLtune`;
     setText(byId("scene-name", HTMLElement), scene?.name ?? "");
-    byId("scene-name", HTMLElement).title = scene?.path ?? "";
+    byId("scene-name", HTMLElement).title = scene?.path ?? scene?.name ?? "";
     byId("unsaved", HTMLElement).classList.toggle("on", unsaved);
     byId("unsaved-config", HTMLElement).hidden = !state?.unsaved;
     byId("unsaved-sidecar", HTMLElement).hidden = !state?.unsaved_lights;

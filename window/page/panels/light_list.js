@@ -99,7 +99,11 @@ export class LightList {
       const count = (counts.get(light.type) ?? 0) + 1;
       counts.set(light.type, count);
       setAttribute(/** @type {Element} */ (row.querySelector("use")), "href", `#icon-${light.type}`);
-      setText(/** @type {Element} */ (row.querySelector(".name")), `${LIGHT_NAMES[light.type]} ${count}`);
+      setText(
+        /** @type {Element} */ (row.querySelector(".name")),
+        light.name || `${LIGHT_NAMES[light.type]} ${count}`,
+      );
+      row.title = light.name ?? "";
       /** @type {HTMLElement} */ (row.querySelector(".swatch")).style.setProperty(
         "--light",
         colourOf(light.intensity).hex,

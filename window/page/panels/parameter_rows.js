@@ -65,15 +65,16 @@ class ParameterRow {
     const { configs, fit } = model.state ?? {};
     const source = model.edited;
     const kept = configs?.[source] ?? configs?.hand;
-    const prior = source === "auto" ? model.shown.a?.header.parameters?.[spec.name] : undefined;
+    const header = model.shown.a?.header;
+    const prior = header?.source === source ? header.parameters?.[spec.name] : undefined;
     const own =
       source === "hand"
-        ? model.current(`parameter ${spec.name}`, kept?.parameters[spec.name])
-        : kept?.parameters[spec.name];
-    const value = prior ?? own ?? spec.default;
+        ? model.current(`parameter ${spec.name}`, prior ?? kept?.parameters[spec.name])
+        : (prior ?? kept?.parameters[spec.name]);
+    const value = own ?? spec.default;
     this.slider.show(value, `${formatted(value)} ${PLAIN_UNITS.includes(spec.unit) ? "" : spec.unit}`.trim());
     this.number.show(value);
-    const fixed = prior !== undefined;
+    const fixed = source === "auto" && prior !== undefined;
     this.slider.input.disabled = fixed;
     this.number.enable(!fixed, fixed ? "set by the prior in every frame" : "");
     this.root.classList.toggle("fixed", fixed);

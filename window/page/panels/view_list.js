@@ -8,6 +8,9 @@
 import { byId, element, iconButton } from "../controls/elements.js";
 import { humanised } from "../maths/words.js";
 
+/** The split of views that were kept in the window, which alone can be removed. */
+const KEPT = "kept";
+
 /** @param {Model} model @param {Connection} connection @param {CameraMoves} moves */
 export function viewList(model, connection, moves) {
   const list = byId("view-list", HTMLElement);
@@ -30,7 +33,7 @@ export function viewList(model, connection, moves) {
     if (next === drawn) return;
     drawn = next;
     list.replaceChildren(
-      ...views.map((view) => {
+      ...views.map((view, index) => {
         const go = element(
           "button",
           { type: "button", class: "go", title: `Go to ${view.name}` },
@@ -38,12 +41,16 @@ export function viewList(model, connection, moves) {
           element("small", {}, humanised(view.split ?? "")),
         );
         go.addEventListener("click", () => {
-          const now = model.state?.views.find((each) => each.name === view.name);
+          const now = model.state?.views[index];
           if (now) moves.ease(now.camera);
         });
+        const row = element("li", { class: "view", "data-view": view.name }, go);
+        // The views of the file are the file's.
+        if (view.split !== KEPT) return row;
         const remove = iconButton("remove", `Remove ${view.name}`);
         remove.addEventListener("click", () => connection.send({ type: "remove_view", name: view.name }));
-        return element("li", { class: "view", "data-view": view.name }, go, remove);
+        row.append(remove);
+        return row;
       }),
     );
   });

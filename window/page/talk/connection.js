@@ -17,7 +17,8 @@ export class Connection {
   }
 
   open() {
-    const address = new URL("/socket", location.href);
+    // The page's own query may hold the token that a page from another machine needs.
+    const address = new URL(`/socket${location.search}`, location.href);
     address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
     const socket = new WebSocket(address);
     socket.binaryType = "arraybuffer";

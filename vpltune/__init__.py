@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from vpltune.renderer.scene.views import View, read_views
     from vpltune.tuner import surrogate
     from vpltune.tuner.scene_fit.fit_scene import FitOptions, FitResult, fit
+    from vpltune.window.notebook import Window, view
 
 __all__ = [
     "FitOptions",
@@ -26,11 +27,13 @@ __all__ = [
     "Runtime",
     "TunedConfig",
     "View",
+    "Window",
     "fit",
     "read_config",
     "read_scene",
     "read_views",
     "surrogate",
+    "view",
 ]
 
 _HOMES = {
@@ -39,10 +42,12 @@ _HOMES = {
     "Runtime": "vpltune.renderer.frame.runtime",
     "TunedConfig": "vpltune.renderer.config.tuned_config",
     "View": "vpltune.renderer.scene.views",
+    "Window": "vpltune.window.notebook",
     "fit": "vpltune.tuner.scene_fit.fit_scene",
     "read_config": "vpltune.renderer.config.tuned_config",
     "read_scene": "vpltune.renderer.scene.files",
     "read_views": "vpltune.renderer.scene.views",
+    "view": "vpltune.window.notebook",
 }
 
 

@@ -5,8 +5,6 @@ import ipaddress
 import secrets
 from urllib.parse import parse_qs, urlsplit
 
-from websockets.datastructures import Headers
-
 TOKEN_BYTES = 16
 """Random bytes of a token: 128 bits cannot be guessed."""
 
@@ -23,14 +21,20 @@ class Admission:
         self.token = None if self._local else secrets.token_urlsafe(TOKEN_BYTES)
         """What a page from another machine must know; None where only this machine can connect."""
 
-    def refusal(self, path: str, headers: Headers) -> str | None:
+    def refusal(self, path: str, hosts: list[str], origins: list[str]) -> str | None:
         """Why a request for the socket is refused; None if it may come in.
 
         A web page of somebody else, open in the same browser, can connect to this machine too. It cannot
         forge the header Origin, nor, on a name of its own that it points here, the header Host.
+
+        Args:
+            path: with the query, which may hold the token.
+            hosts: values of the header Host.
+            origins: values of the header Origin; programs that are no browsers send none.
         """
-        host = headers.get("Host", "")
-        origin = headers.get("Origin")
+        if len(hosts) != 1 or len(origins) > 1:
+            return "the headers Host and Origin must be there once"
+        host, origin = hosts[0], origins[0] if origins else None
         if origin is not None and urlsplit(origin).netloc != host:
             return "the page is from another site"
         if self._local and not is_loopback(_name_of(host)):

@@ -1,6 +1,7 @@
 """Saves, loads and watches the files of a window, and keeps what was not saved."""
 
 import asyncio
+import os
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from vpltune.renderer.config.tuned_config import PRESETS, TunedConfig, read_config
-from vpltune.renderer.errors import InputError, MachineError
+from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.placement.sidecar_file import sidecar_path
 from vpltune.renderer.scene.scene import Camera
 from vpltune.renderer.scene.views import light_to_json
-from vpltune.window import saving
+from vpltune.window import saving, wire
 from vpltune.window.document import Document, Edited
 from vpltune.window.recovery import Recovery
 from vpltune.window.watched_files import WatchedFiles
@@ -29,7 +30,7 @@ class FileDesk:
         scene: the scene's file; None for a scene in memory.
         config: the config file that the window was opened with; None for a preset.
         output: the folder to save to; None takes the usual one.
-        fit_folder: gives the folder of the fit that found a config, or None.
+        fit_result: gives the config and the folder of the fit whose result a config is, or None.
         scene_changed: called when the scene or its sidecar should be read anew.
         changed: called when the document has changed or was saved.
         notify: called with a line and its level.
@@ -42,13 +43,13 @@ class FileDesk:
         config: Path | None,
         output: Path | None,
         *,
-        fit_folder: Callable[[TunedConfig], Path | None],
+        fit_result: Callable[[TunedConfig], tuple[TunedConfig, Path] | None],
         scene_changed: Callable[[], None],
         changed: Callable[[], None],
         notify: Callable[..., None],
     ):
         self._document, self._scene, self._config = document, scene, config
-        self._fit_folder, self._scene_changed, self._changed = fit_folder, scene_changed, changed
+        self._fit_result, self._scene_changed, self._changed = fit_result, scene_changed, changed
         self._notify = notify
         self.paths = saving.usual_paths(scene, config, output)
         """Where the config, the sidecar and the views are saved if nobody says otherwise."""
@@ -107,9 +108,9 @@ class FileDesk:
         now = self._document.now
         name = "" if self._scene is None else str(self._scene)
         if what == "config":
-            provenance = now.config.provenance or {"scene": name, "edited": "by hand in vpltune view"}
-            config = replace(now.config, provenance=provenance)
-            line = await asyncio.to_thread(saving.save_config, path, config, self._fit_folder(now.config))
+            by_hand = now.config.provenance or {"scene": name, "edited": "by hand in vpltune view"}
+            result = self._fit_result(now.config) or (replace(now.config, provenance=by_hand), None)
+            line = await asyncio.to_thread(saving.save_config, path, *result)
         elif what == "sidecar":
             line = await asyncio.to_thread(saving.save_sidecar, path, camera, now.lights)
         else:
@@ -178,8 +179,8 @@ class FileDesk:
         async def done() -> None:
             try:
                 await work
-            except (InputError, MachineError) as error:
-                tell_sender(str(error))
+            except Exception as error:
+                tell_sender(wire.explained(error))
 
         task = asyncio.get_running_loop().create_task(done())
         self._tasks.add(task)
@@ -196,4 +197,8 @@ def config_file(config: str | Path | TunedConfig) -> Path | None:
 def _path(value: Any, where: str) -> Path:
     if not isinstance(value, str) or not value.strip() or "\0" in value:
         raise InputError(f"{where}: must be a path, got {value!r:.60}")
+    try:
+        os.fsencode(value)
+    except UnicodeEncodeError as error:
+        raise InputError(f"{where}: is not a name that a file can have, got {value!r:.60}") from error
     return Path(value.strip()).expanduser()

@@ -73,9 +73,10 @@ class FitDesk:
             self._worker.stop()
             self._worker = None
 
-    def folder_of(self, config: TunedConfig) -> Path | None:
-        """The folder with the files of the fit that found this very config; None if it is not a fit's."""
-        return self.folder if self._found is not None and config == self._found else None
+    def result_for(self, config: TunedConfig) -> tuple[TunedConfig, Path] | None:
+        """The last fit's config and the folder of its files, if `config` draws the same images; else None."""
+        found = self._found
+        return (found, self.folder) if found is not None and config.draws_as(found) else None
 
     def _said(self, message: Any) -> None:
         if isinstance(message, FitStep):

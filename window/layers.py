@@ -34,7 +34,7 @@ class LayerPainter:
     ) -> tuple[Pixels | None, dict[str, float | int] | None]:
         """The image that a request asks for, and the parameters that a prior set for it.
 
-        The right pane has the left one's exposure, so that their brightness can be compared.
+        The right pane has the exposure of the left one's final image, so that brightness can be compared.
 
         Args:
             request: what to paint.
@@ -51,9 +51,9 @@ class LayerPainter:
         drawn = self._runtime.draw(view, request.config, state, exposure=exposure)
         captured = drawn.capture(maps=request.layer == "maps")
         self._seen[request.client] = (view.camera, captured)
-        pixels = self._layer(request, view, drawn, captured, exposure)
-        if request.pane == "a" and request.layer in ("final", *_SHARES):
+        if request.pane == "a":
             self._exposures[request.client] = drawn.read_exposure()
+        pixels = self._layer(request, view, drawn, captured, exposure)
         prior = None if request.config.auto is None else drawn.read_parameters().as_dict()
         return pixels, prior
 
@@ -74,26 +74,25 @@ class LayerPainter:
         captured: CapturedFrame,
         exposure: float | None,
     ) -> Pixels:
-        layer = request.layer
-        if layer in _SHARES:
-            drawn.frame.resolve(_SHARES[layer], exposure)
-        if layer in ("final", *_SHARES):
-            pixels = np.ascontiguousarray(read_image(drawn.frame.resources, "display")[..., :3])
+        layer, resources = request.layer, drawn.frame.resources
+        if layer in ("final", "discs"):
+            shown = np.ascontiguousarray(read_image(resources, "display")[..., :3])
             check_errors(self._runtime.context, f"layer {layer}")
-            return pixels
-        if layer == "discs":
-            shown = read_image(drawn.frame.resources, "display")[..., :3]
-            return discs_on_surfaces(captured, view, shown)
+            return shown if layer == "final" else discs_on_surfaces(captured, view, shown)
         if layer == "rsm":
-            return rsm_mosaic(read_image(drawn.frame.resources, "rsm_reflectance")[..., :3], view.size)
+            return rsm_mosaic(read_image(resources, "rsm_reflectance")[..., :3], view.size)
         if layer == "maps":
             return map_mosaic(captured.visibility_maps, view.size)
-        image = {
-            "irradiance": captured.indirect_irradiance,
-            "albedo": captured.albedo,
-            "normal": captured.normal_world * captured.valid[..., None],
-            "depth": captured.depth,
-        }[layer]
+        if layer in _SHARES:
+            drawn.frame.resolve(_SHARES[layer], 1.0)
+            image = read_image(resources, "radiance")[..., :3]
+        else:
+            image = {
+                "irradiance": captured.indirect_irradiance,
+                "albedo": captured.albedo,
+                "normal": captured.normal_world * captured.valid[..., None],
+                "depth": captured.depth,
+            }[layer]
         return as_bytes(for_display(self._runtime, layer, image, exposure))
 
     def _of_reference(self, request: DrawRequest, view: View) -> Pixels | None:

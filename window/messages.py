@@ -170,7 +170,7 @@ def _parameter_change(message: dict[str, Any]) -> tuple[str, Callable[[Edited], 
 
 def _quality_change(message: dict[str, Any]) -> tuple[str, Callable[[Edited], Edited]]:
     name, value = message["quality"], message.get("value")
-    if name not in Quality.__dataclass_fields__ or name == "budget":
+    if not isinstance(name, str) or name == "budget" or name not in Quality.__dataclass_fields__:
         raise InputError(f"edit.quality: there is no setting {name!r:.60}")
 
     def changed(now: Edited) -> Edited:
@@ -182,7 +182,7 @@ def _quality_change(message: dict[str, Any]) -> tuple[str, Callable[[Edited], Ed
         quality = Quality.validated(members, "edit.quality")
         return replace(now, config=edited_by_hand(replace(now.config, quality=quality)))
 
-    return str(name).replace("_", " "), changed
+    return name.replace("_", " "), changed
 
 
 def _light_change(document: Document, message: dict[str, Any]) -> tuple[str, Callable[[Edited], Edited]]:

@@ -40,6 +40,7 @@ async def serve_window(
     opened: Callable[[str], None],
     tell: Callable[[str], None],
     stop: asyncio.Event | None = None,
+    attached: Callable[[Session], None] = lambda session: None,
 ) -> None:
     """Serve a window until `stop` is set, or the task is cancelled.
 
@@ -49,6 +50,7 @@ async def serve_window(
         opened: called with the page's address once it can be opened.
         tell: called with each line for whoever started the window.
         stop: ends the window.
+        attached: called with the session once its scene is there.
 
     Raises:
         InputError: the scene, the config or the port cannot be used.
@@ -58,13 +60,15 @@ async def serve_window(
     session = Session(window, tell)
     try:
         await session.opened
+        attached(session)
         admission, site = Admission(server.host), Site()
         numbers = itertools.count()
 
         def requested(connection: ServerConnection, request: Request) -> Response | None:
             if request.path.partition("?")[0] != "/socket":
                 return site.response(request.path)
-            reason = admission.refusal(request.path, request.headers)
+            headers = request.headers
+            reason = admission.refusal(request.path, headers.get_all("Host"), headers.get_all("Origin"))
             if reason is None and len(session.clients) >= MOST_CLIENTS:
                 reason = f"{MOST_CLIENTS} pages are open already"
             return None if reason is None else refusal(reason)

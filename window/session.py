@@ -90,7 +90,7 @@ class Session:
             options.source.path,
             file,
             options.output,
-            fit_folder=self._fit.folder_of,
+            fit_result=self._fit.result_for,
             scene_changed=self._crew.read_again,
             changed=self._document_changed,
             notify=self.notify,
@@ -137,8 +137,9 @@ class Session:
             if handler is None:
                 raise InputError(f"message: there is no type {message['type']!r:.60}")
             handler(client, message)
-        except (InputError, MachineError) as error:
-            _teller(client)(str(error))
+        except Exception as error:
+            # Nothing that one page says may end the window of another.
+            _teller(client)(wire.explained(error))
         self._queue.next(self.clients.values())
 
     def notify(self, text: str, level: str = "info") -> None:

@@ -15,6 +15,7 @@ from vpltune.renderer.config.quality import (
     SMALLEST_RSM,
 )
 from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.errors import InputError, MachineError
 from vpltune.renderer.files.strict_json import strict_json
 from vpltune.renderer.scene.views import camera_to_json, light_to_json
 from vpltune.window.document import Document, NamedView
@@ -119,6 +120,13 @@ def state_message(
 def notice(text: str, level: str = "info") -> dict[str, Any]:
     """`notice`: one line for the person at the page."""
     return {"type": "notice", "level": level, "text": text}
+
+
+def explained(error: Exception) -> str:
+    """One line for an error that a message or a file has caused."""
+    if isinstance(error, InputError | MachineError):
+        return str(error)
+    return f"a defect of vpltune, please report it: {type(error).__name__}: {error}"
 
 
 def image_message(drawn: DrawnImage, *, settled: bool, share: float, noise: float | None) -> bytes:

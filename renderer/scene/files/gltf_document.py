@@ -9,7 +9,8 @@ from vpltune.renderer.scene.files.json_object import JsonObject, JsonObjects, pa
 from vpltune.renderer.scene.files.limits import DecodedBytes
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
 
-_GLB_MAGIC = b"glTF"
+GLB_MAGIC = b"glTF"
+"""The first bytes of a .glb file (glTF 2.0, section 4.4.2)."""
 # Chunk types "JSON" and "BIN": glTF 2.0, section 4.4.3.
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 
@@ -100,7 +101,7 @@ def open_gltf(path: Path, warnings: Warnings) -> GltfDocument:
     if not content:
         raise SceneFileError("is empty")
     # Decide by content, because a .glb named .gltf is common.
-    is_binary = content.startswith(_GLB_MAGIC) or path.suffix.lower() == ".glb"
+    is_binary = content.startswith(GLB_MAGIC) or path.suffix.lower() == ".glb"
     json_chunk, binary_chunk = _glb_chunks(content) if is_binary else (content, None)
     document = GltfDocument(parse_json(json_chunk), folder, binary_chunk, warnings)
     _check_version(document.root)
@@ -112,7 +113,7 @@ def _glb_chunks(content: bytes) -> tuple[bytes, memoryview | None]:
     if len(content) < 20:
         raise SceneFileError(f"GLB header: must be at least 20 bytes, got {len(content)}")
     magic, version, length = struct.unpack_from("<4sII", content)
-    if magic != _GLB_MAGIC:
+    if magic != GLB_MAGIC:
         raise SceneFileError(f"GLB header: must begin with 'glTF', got {magic!r}")
     if version != 2:
         raise SceneFileError(f"GLB header: version must be 2, got {version}")

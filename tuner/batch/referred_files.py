@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
+from vpltune.renderer.files.glb_container import GLB_MAGIC
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
-from vpltune.renderer.scene.files.gltf_document import GLB_MAGIC
 from vpltune.renderer.scene.files.json_object import parse_json
 from vpltune.renderer.scene.files.limits import MAX_FILE_BYTES
 from vpltune.renderer.scene.files.mtl_materials import MOST_LIBRARIES, map_statement, mtl_statements
@@ -23,8 +23,6 @@ from vpltune.renderer.scene.files.ply_data import LONGEST_HEADER, parse_ply_head
 from vpltune.renderer.scene.files.text_lines import first_word, text_lines
 from vpltune.renderer.scene.mitsuba_import.xml_tree import XmlNode, parse_xml
 
-READ_SUFFIXES = (".gltf", ".glb", ".obj", ".ply")
-"""Extensions of the scene files that `read_scene` reads."""
 MITSUBA_SUFFIX = ".xml"
 """Extension of a Mitsuba scene."""
 

@@ -4,15 +4,11 @@ import struct
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from vpltune.renderer.files.glb_container import BINARY_CHUNK, GLB_MAGIC, JSON_CHUNK
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
 from vpltune.renderer.scene.files.json_object import JsonObject, JsonObjects, parse_json
 from vpltune.renderer.scene.files.limits import DecodedBytes
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
-
-GLB_MAGIC = b"glTF"
-"""The first bytes of a .glb file (glTF 2.0, section 4.4.2)."""
-# Chunk types "JSON" and "BIN": glTF 2.0, section 4.4.3.
-_JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 
 # Extensions that the readers support.
 READ_EXTENSIONS = frozenset(
@@ -120,12 +116,12 @@ def _glb_chunks(content: bytes) -> tuple[bytes, memoryview | None]:
     if length > len(content):
         raise SceneFileError(f"GLB header: says {length} bytes, but the file is cut off after {len(content)}")
     kind, json_chunk, end = _glb_chunk(content, 12, length)
-    if kind != _JSON_CHUNK:
+    if kind != JSON_CHUNK:
         raise SceneFileError(f"GLB: the first chunk must be JSON, got type {kind:#x}")
     # Only the second chunk can be the binary buffer. Chunks of other types must be ignored.
     if end + 8 <= length:
         kind, binary_chunk, _ = _glb_chunk(content, end, length)
-        if kind == _BINARY_CHUNK:
+        if kind == BINARY_CHUNK:
             return bytes(json_chunk), binary_chunk
     return bytes(json_chunk), None
 

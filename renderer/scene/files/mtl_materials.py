@@ -250,6 +250,7 @@ class MtlMaterials:
 
 
 def _leading_number(text: str, absent: float) -> float:
+    """What is no number counts as absent: opacity changes no image, so it makes no scene unusable."""
     words = text.split()
     return plain_number(words[0]) if words and _is_number(words[0]) else absent
 

@@ -152,6 +152,19 @@ class TestWork:
         tracemalloc.stop()
         assert peak < count  # not even the indices, of a byte each
 
+    def test_many_instances_of_a_large_mesh_take_the_memory_of_one(self, gltf):
+        """Their corners in the world are 288 MB together; the file and its mesh need less than 5 MB."""
+        points, instances = 60_000, 200
+        gltf.add_primitive(np.random.default_rng(3).random((points, 3)).astype(np.float32))
+        gltf.document["nodes"] *= instances
+        gltf.document["scenes"] = [{"nodes": list(range(instances))}]
+        path = gltf.write()
+        tracemalloc.start()
+        assert len(read_scene(path).instances) == instances
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert peak < 0.1 * instances * points * 3 * 8
+
     def test_json_text_of_wide_characters_is_limited(self, tmp_path):
         path = tmp_path / "scene.gltf"
         path.write_text(json.dumps({"asset": {"version": "2.0"}}) + " " * (1 << 25) + "\U0001f600")

@@ -13,11 +13,10 @@ from urllib.parse import quote, unquote
 
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import written_whole
+from vpltune.renderer.files.glb_container import GLB_MAGIC, JSON_CHUNK
+from vpltune.renderer.files.strict_json import no_constant
 
 EXTRAS_KEY = "vpltune"
-_GLB_MAGIC = b"glTF"
-# "JSON", little-endian: glTF 2.0, 4.4.3.
-_JSON_CHUNK = 0x4E4F534A
 GLTF_SUFFIXES = (".gltf", ".glb")
 
 
@@ -74,23 +73,19 @@ def _opened(path: Path) -> tuple[dict[str, Any], bytes | None]:
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     rest = None
-    if content[:4] == _GLB_MAGIC:
+    if content[:4] == GLB_MAGIC:
         if len(content) < 20:
             raise InputError(f"{path}: GLB header: must be at least 20 bytes, got {len(content)}")
         length, kind = struct.unpack_from("<II", content, 12)
-        if kind != _JSON_CHUNK or 20 + length > len(content):
+        if kind != JSON_CHUNK or 20 + length > len(content):
             raise InputError(f"{path}: GLB: the first chunk must be JSON, and whole")
         content, rest = content[20 : 20 + length], content[20 + length :]
     try:
-        root = json.loads(content, parse_constant=_no_constant)
+        root = json.loads(content, parse_constant=no_constant)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: not JSON ({error})") from error
     _check_lists(root, path)
     return root, rest
-
-
-def _no_constant(name: str) -> float:
-    raise ValueError(f"{name} is not a JSON number")
 
 
 def _check_lists(root: Any, path: Path) -> None:
@@ -122,5 +117,5 @@ def _moved_uri(uri: str, scene: Path, target: Path) -> str:
 
 def _glb(text: bytes, rest: bytes) -> bytes:
     text += b" " * (-len(text) % 4)
-    header = struct.pack("<4sII", _GLB_MAGIC, 2, 20 + len(text) + len(rest))
-    return header + struct.pack("<II", len(text), _JSON_CHUNK) + text + rest
+    header = struct.pack("<4sII", GLB_MAGIC, 2, 20 + len(text) + len(rest))
+    return header + struct.pack("<II", len(text), JSON_CHUNK) + text + rest

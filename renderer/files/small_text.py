@@ -1,4 +1,4 @@
-"""Text files of a few kilobytes that a user writes or edits: JSON and TOML."""
+"""Text files that are read whole, up to a size: JSON and TOML that a user writes or edits."""
 
 from pathlib import Path
 

@@ -34,6 +34,15 @@ def unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return members
 
 
+def no_constant(name: str) -> float:
+    """A `parse_constant` for `json.loads` that refuses NaN and Infinity, which Python reads by default.
+
+    Raises:
+        ValueError: always.
+    """
+    raise ValueError(f"{name} is not a JSON number")
+
+
 def _finite(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(key): _finite(member) for key, member in value.items()}

@@ -11,6 +11,8 @@ import math
 import numpy as np
 from jaxtyping import Float64
 
+from vpltune.renderer.scene.spot_cone import checked_cone, cone_scale
+
 DYNAMIC_LIGHT_DTYPE = np.dtype(
     [
         ("position_world", "f4", 3),
@@ -78,21 +80,17 @@ def spot_lights(
         intensity: W/sr, linear, of shape [n, 3] or [3].
         range_world: world units, of shape [n] or one number.
         directions_world: unit vectors in which the light travels.
-        inner_cone: half angle in radians.
+        inner_cone: half angle in radians; equal to `outer_cone` for a hard edge.
         outer_cone: half angle in radians.
 
     Raises:
-        ValueError: 0 ≤ inner_cone < outer_cone ≤ π/2 does not hold.
+        InputError: 0 ≤ inner_cone ≤ outer_cone ≤ π/2 does not hold, or outer_cone is 0.
     """
-    if not 0.0 <= inner_cone < outer_cone <= math.pi / 2:
-        raise ValueError(
-            f"spot_lights: cone angles must satisfy 0 ≤ inner < outer ≤ π/2, "
-            f"got {inner_cone} and {outer_cone}"
-        )
+    inner_cone, outer_cone = checked_cone(inner_cone, outer_cone, "radians", "spot_lights")
     records = point_lights(positions_world, intensity, range_world)
     records["direction_world"] = directions_world
     records["cos_outer"] = math.cos(outer_cone)
-    records["cone_scale"] = 1.0 / max(math.cos(inner_cone) - math.cos(outer_cone), 1e-6)
+    records["cone_scale"] = cone_scale(inner_cone, outer_cone)
     return records
 
 

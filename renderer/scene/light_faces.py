@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from vpltune.renderer.scene.scene import Light
+from vpltune.renderer.scene.spot_cone import cone_scale
 from vpltune.renderer.scene.sun_faces import SunGrid, sun_faces
 
 KIND_CODES = {"spot": 0, "point": 1, "directional": 2}
@@ -96,11 +97,10 @@ def light_records(
     faces: list[np.ndarray] = []
     for index, light in enumerate(lights):
         own = _faces(light, index, bounds, grid)
-        cos_inner, cos_outer = math.cos(light.inner_cone), math.cos(light.outer_cone)
         records[index] = (
             (*light.position_world, KIND_CODES[light.kind]),
-            (*light.direction_world, 1.0 / max(cos_inner - cos_outer, 1e-6)),
-            (*light.intensity, cos_outer),
+            (*light.direction_world, cone_scale(light.inner_cone, light.outer_cone)),
+            (*light.intensity, math.cos(light.outer_cone)),
             (len(faces), len(own), 0, 0),
         )
         faces += own

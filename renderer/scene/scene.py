@@ -152,16 +152,12 @@ class Scene:
 
     def bounds(self) -> Float64[np.ndarray, "2 3"]:
         """Axis-aligned bounds of all instances in world units: the low corner, then the high corner."""
-        corners = [
-            transform_points(instance.to_world, self.meshes[instance.mesh].positions)
-            for instance in self.instances
-        ]
-        return np.stack(
-            [
-                np.min([points.min(axis=0) for points in corners], axis=0),
-                np.max([points.max(axis=0) for points in corners], axis=0),
-            ]
-        )
+        lows, highs = [], []
+        for instance in self.instances:
+            points = transform_points(instance.to_world, self.meshes[instance.mesh].positions)
+            lows.append(points.min(axis=0))
+            highs.append(points.max(axis=0))
+        return np.stack([np.min(lows, axis=0), np.max(highs, axis=0)])
 
 
 def transform_points(

@@ -12,6 +12,7 @@ from jaxtyping import Float64
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.renderer.files.small_text import read_small_text
+from vpltune.renderer.scene.files.limits import LARGEST_NUMBER, LARGEST_RADIOMETRIC
 from vpltune.renderer.scene.scene import Camera, Light, scaled_camera, scaled_light
 from vpltune.renderer.scene.spot_cone import checked_cone
 
@@ -173,7 +174,7 @@ def light_from_json(entry: Any, where: str) -> Light:
     kind = _member(entry, "type", where)
     if kind not in ("spot", "point", "directional"):
         raise InputError(f"{where}.type: must be 'spot', 'point' or 'directional', got {kind!r:.60}")
-    intensity = _numbers(entry, "intensity", 3, where)
+    intensity = _numbers(entry, "intensity", 3, where, LARGEST_RADIOMETRIC)
     if (intensity < 0.0).any():
         raise InputError(f"{where}.intensity: must not be negative, got {intensity.tolist()}")
     light: dict[str, Any] = {}
@@ -199,13 +200,16 @@ def _member(entry: Any, key: str, where: str) -> Any:
     return entry[key]
 
 
-def _numbers(entry: Any, key: str, count: int, where: str) -> Float64[np.ndarray, " count"]:
+def _numbers(
+    entry: Any, key: str, count: int, where: str, most: float = LARGEST_NUMBER
+) -> Float64[np.ndarray, " count"]:
     value = _member(entry, key, where)
     items = value if isinstance(value, list) else [value]
     # Python's json reads 1e999 as infinity and NaN as NaN, and bool is a subclass of int.
     plain = all(isinstance(item, int | float) and not isinstance(item, bool) for item in items)
-    if not plain or len(items) != count or not all(abs(item) <= 1e30 for item in items):
+    if not plain or len(items) != count or not all(abs(item) <= most for item in items):
         raise InputError(
-            f"{where}.{key}: must be {count} finite number{'s' * (count > 1)}, got {value!r:.60}"
+            f"{where}.{key}: must be {count} finite number{'s' * (count > 1)}, got {value!r:.60}; "
+            f"at most {most:g} each"
         )
     return np.array(items, np.float64)

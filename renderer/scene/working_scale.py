@@ -7,8 +7,8 @@ import numpy as np
 from vpltune.renderer.scene.scene import Scene
 
 DRAWN_AS_IT_IS = 2.0**20
-"""A scene whose diagonal is at most this many world units, and at least one so many-th, is drawn in world
-units. A choice: 1e6 metres, far within the 1e9 at which indirect light begins to be lost."""
+"""A scene whose diagonal is in [1/DRAWN_AS_IT_IS, DRAWN_AS_IT_IS] is drawn in world units. A choice: 1e6
+metres, far within the 1e9 at which indirect light begins to be lost."""
 
 
 def working_scale(scene: Scene) -> float:

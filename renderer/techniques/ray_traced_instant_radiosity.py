@@ -13,6 +13,7 @@ from vpltune.renderer.frame.frame_pass import FrameInputs
 from vpltune.renderer.frame.point_table import r2_sequence
 from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.scene.scene import Light, Scene, transform_points
+from vpltune.renderer.scene.spot_cone import cone_scale
 from vpltune.renderer.scene.views import View
 from vpltune.renderer.techniques.gathered_vpls import VPL_DTYPE, GatheredVpls
 
@@ -87,8 +88,8 @@ def _cone_falloff(light: Light, direction: np.ndarray) -> np.ndarray:
     """KHR_lights_punctual, "Inner and Outer Cone Angles"."""
     if light.kind != "spot":
         return np.ones(len(direction))
-    inner, outer = math.cos(light.inner_cone), math.cos(light.outer_cone)
-    return np.clip((direction @ light.direction_world - outer) / max(inner - outer, 1e-6), 0.0, 1.0) ** 2
+    above = direction @ light.direction_world - math.cos(light.outer_cone)
+    return np.clip(above * cone_scale(light.inner_cone, light.outer_cone), 0.0, 1.0) ** 2
 
 
 def _basis(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

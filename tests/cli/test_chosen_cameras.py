@@ -10,6 +10,7 @@ from quick_fit import QUICK_FIT
 
 from vpltune.cli.program import run
 from vpltune.renderer.config.tuned_config import TunedConfig, write_config
+from vpltune.renderer.errors import InputError
 from vpltune.renderer.export.glb_writer import write_glb
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.placement import named_camera, named_cameras
@@ -36,15 +37,26 @@ def test_cameras_have_names_and_numbers(room):
     scene = read_scene(room / "room.glb")
     assert [camera.name for camera in scene.cameras] == ["door", "near"]
     assert named_camera(scene, "near") is named_camera(scene, "2") is scene.cameras[1]
+    assert named_camera(scene, "0000000000002") is scene.cameras[1]
     assert named_cameras(scene, "all") == scene.cameras
+
+
+@pytest.mark.parametrize("name", ["0", "3", "0000000015", "1" + "0" * 5000, "-1", "²", "١", ""])
+def test_a_number_that_no_camera_has_is_refused(room, name):
+    scene = read_scene(room / "room.glb")
+    for select in (named_camera, named_cameras):
+        with pytest.raises(InputError, match="--camera: must be .*one of 'door', 'near', got"):
+            select(scene, name)
+    with pytest.raises(InputError, match="--camera: the scene has no cameras; leave --camera out, got"):
+        named_cameras(replace(scene, cameras=()), name)
 
 
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (["--camera", "far"], "--camera: must be all or one of 'door', 'near', got 'far'"),
+        (["--camera", "far"], "--camera: must be one of 'door', 'near', got 'far'"),
         (["--camera", "3"], "got '3'"),
-        (["--camera", "all"], "--camera: all is for fit and evaluate; an image needs one camera"),
+        (["--camera", "all"], "--camera: an image needs one camera, got all, which is for fit"),
         (["--camera", "near", "--eye", "0,1,2", "--look-at", "0,0,0"], "leave out --eye, --look-at, --yfov"),
     ],
 )

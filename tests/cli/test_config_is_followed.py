@@ -213,6 +213,8 @@ def test_interleaving_takes_a_word_or_a_number():
     assert changed.quality == replace(QUALITY, interleave="auto")
     assert notes == ("--interleave auto overrides the config, which has 4",)
     assert with_flags(CONFIG, interleave="2")[0].quality == replace(QUALITY, interleave=2)
+    with pytest.raises(InputError, match="--interleave: must be"):
+        with_flags(CONFIG, interleave="9" * 5000)  # Python refuses to read so many digits
 
 
 def test_a_flag_that_changes_nothing_says_nothing(rendered, config_path, runtime, view, capfd):

@@ -99,7 +99,7 @@ def _configs() -> tuple[dict[str, Any], ...]:
     for document in presets:
         document.pop("checksum")
     full.pop("checksum")
-    return (*presets, full, full, old)
+    return (*presets, full, old)
 
 
 def _write(path: Path, tree: dict[str, Any], rng: random.Random, mutated: bool) -> Path:

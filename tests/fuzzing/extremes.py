@@ -20,6 +20,15 @@ class Nested:
     depth: int
     in_objects: bool
 
+    def text(self, object_opening: str) -> str:
+        """The value as text.
+
+        Args:
+            object_opening: how an object with one key begins, up to the key's value.
+        """
+        opening, closing = (object_opening, "}") if self.in_objects else ("[", "]")
+        return opening * self.depth + "1" + closing * self.depth
+
 
 class SecondKey:
     """A key that is written like `name` but is another one to a dict: it makes a key appear twice."""

@@ -21,15 +21,18 @@ from pathlib import Path
 
 from tests.fuzzing.cases import READERS, Case
 from tests.fuzzing.outcomes import Outcome, judged, place_of
+from tests.support.reading_cost import CPU_S, CPU_S_PER_BYTE, MEMORY_BYTES
 
 
 @dataclass(frozen=True)
 class Limits:
     """What reading one file may take."""
 
-    cpu_s: float = 2.0
-    """Processor time in s."""
-    memory_bytes: int = 1 << 30
+    cpu_s: float = CPU_S
+    """Processor time in s, whatever the file's size."""
+    cpu_s_per_byte: float = CPU_S_PER_BYTE
+    """Further processor time in s for each byte of the case's files."""
+    memory_bytes: int = MEMORY_BYTES
     """Address space above that of the warm process."""
     wall_s: float = 60.0
     """A choice: after this time without a report, a fork stands still rather than computes."""
@@ -112,9 +115,13 @@ def _of_death(status: int, stopped: bool, trace: Path, limits: Limits) -> Outcom
     number = os.WTERMSIG(status)
     if number == signal.SIGPROF:
         # Where it was just then differs from case to case: only the file tells one fault from another.
-        kind = f"{_TOO_SLOW} {limits.cpu_s:g} s of processor time in {place.partition(':')[0]}"
+        kind = f"{_too_slow(limits)} in {place.partition(':')[0]}"
         return Outcome("finding", kind, place)
     return Outcome("finding", f"{signal.Signals(number).name} at {place}", text.strip().split("\n")[0][:200])
+
+
+def _too_slow(limits: Limits) -> str:
+    return f"{_TOO_SLOW} {limits.cpu_s:g} s and {1e6 * limits.cpu_s_per_byte:g} µs a byte of processor time"
 
 
 def _work(batch: list[Case], limits: Limits, folder: Path, writing: int) -> None:
@@ -149,14 +156,15 @@ def _work(batch: list[Case], limits: Limits, folder: Path, writing: int) -> None
 
 def _of_case(case: Case, place: Path, limits: Limits) -> Outcome:
     path, mutated = case.write(place)
-    signal.setitimer(signal.ITIMER_PROF, limits.cpu_s)
+    allowed_s = limits.cpu_s + limits.cpu_s_per_byte * sum(file.stat().st_size for file in place.iterdir())
+    signal.setitimer(signal.ITIMER_PROF, allowed_s)
     begin = time.process_time()
     outcome = judged(READERS[case.reader].read, path, mutated)
     spent = time.process_time() - begin
     signal.setitimer(signal.ITIMER_PROF, 0.0)
     # The timer counts in ticks of the kernel.
-    if spent > limits.cpu_s and outcome.verdict != "finding":
-        return Outcome("finding", f"{_TOO_SLOW} {limits.cpu_s:g} s of processor time", f"{spent:.1f} s")
+    if spent > allowed_s and outcome.verdict != "finding":
+        return Outcome("finding", _too_slow(limits), f"{spent:.1f} s")
     return outcome
 
 

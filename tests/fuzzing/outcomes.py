@@ -1,6 +1,7 @@
 """What may come of reading a file: it is read, it is refused in one line, and all else is a finding."""
 
 import linecache
+import re
 import traceback
 import warnings
 from collections.abc import Callable
@@ -14,6 +15,10 @@ Verdict = Literal["read", "refused", "finding"]
 REPOSITORY = Path(__file__).resolve().parents[2]
 """Places in the code are given from here."""
 _CODE = ("renderer", "vpltune", "tuner")
+_EXPECTED_CAUSES = (OSError, ValueError, RecursionError)
+"""What a refusal may stand for: a file that cannot be opened, or parsed, or nests too deep."""
+_UNFORESEEN = re.compile(r"cannot be read \(\w+: ")
+"""In the message where `reading_border` met an error that no reader foresaw. It names the error's type."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +51,9 @@ def _of_refusal(error: Exception, path: Path, mutated: bool) -> Outcome:
     message = str(error)
     if isinstance(error.__cause__, MemoryError):
         return _finding("MemoryError, refused as too large", error.__cause__)
+    if _is_unforeseen(error):
+        cause = error.__cause__ or error
+        return _finding(f"{type(cause).__name__}, refused as the file's fault", cause)
     if not mutated:
         return _finding("a valid file is refused", error)
     if len(message.splitlines()) != 1:
@@ -57,6 +65,12 @@ def _of_refusal(error: Exception, path: Path, mutated: bool) -> Outcome:
     if len(message) > _LONGEST_MESSAGE + len(str(path)):
         return _finding(f"message of more than {_LONGEST_MESSAGE} characters", error)
     return Outcome("refused")
+
+
+def _is_unforeseen(error: Exception) -> bool:
+    """Whether a fault of the reader became a refusal, as every error does at the readers' border."""
+    is_expected = error.__cause__ is None or isinstance(error.__cause__, _EXPECTED_CAUSES)
+    return not is_expected or _UNFORESEEN.search(str(error)) is not None
 
 
 _LONGEST_MESSAGE = 1000

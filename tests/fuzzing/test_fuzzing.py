@@ -74,17 +74,24 @@ def test_what_failed_once_does_so_no_more():
 FAULTS = {
     "raise TypeError('seeded')": "TypeError at ",
     "bytearray(2 << 30)": "MemoryError at ",
-    "while True: pass": "more than 0.3 s of processor time in ",
+    "while True: pass": "more than 0.3 s and 3 µs a byte of processor time in ",
     "os.kill(os.getpid(), signal.SIGSEGV)": "SIGSEGV at ",
     "os._exit(3)": "exit with code 3 at ",
     "raise InputError(f'{path}: two\\nlines')": "message of several lines at ",
     "raise InputError('nothing is said of where')": "message without the file's name at ",
     "warnings.warn('seeded')": "UserWarning at ",
+    # The readers' border makes a refusal of any error.
+    "read_at_border(path, lambda: [][0])": "IndexError, refused as the file's fault at ",
+    "read_at_border(path, lambda: int('x'))": "ValueError, refused as the file's fault at ",
+    "try: {}['x']\nexcept KeyError as error: raise InputError(path) from error": (
+        "KeyError, refused as the file's fault at "
+    ),
 }
 SEEDED = """
 import json, os, signal, sys, warnings
 from tests.fuzzing import cases, isolation
 from vpltune.renderer.errors import InputError
+from vpltune.renderer.scene.files.reading_border import read_at_border
 
 def seeded(path):
     if "views" in path.name:

@@ -18,8 +18,7 @@ def json_text(value: Any) -> str:
     if isinstance(value, Raw):
         return value.text
     if isinstance(value, Nested):
-        opening, closing = ('{"a":', "}") if value.in_objects else ("[", "]")
-        return opening * value.depth + "1" + closing * value.depth
+        return value.text('{"a":')
     return json.dumps(value)
 
 
@@ -49,8 +48,7 @@ def _toml_value(value: Any) -> str:
     if isinstance(value, Raw):
         return value.text
     if isinstance(value, Nested):
-        opening, closing = ("{a=", "}") if value.in_objects else ("[", "]")
-        return opening * value.depth + "1" + closing * value.depth
+        return value.text("{a=")
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)  # TOML writes nan and inf as Python does
     # None is no value of TOML: it is left to be refused. Surrogates stay as they are and become broken UTF-8.

@@ -8,12 +8,15 @@ from pathlib import Path
 from typing import Any, Literal
 
 from vpltune.renderer.files.atomic_file import write_text_whole
+from vpltune.renderer.files.small_text import read_small_text
 from vpltune.renderer.files.strict_json import strict_json
 
 Status = Literal["done", "unlit", "failed", "refused"]
 
 SUFFIX = ".json"
 """File name extension of a record."""
+# A choice: most bytes of a record, which usually has 1 kB.
+_LARGEST_FILE = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,7 @@ class Records:
     def read(self, key: str) -> Record | None:
         """The record of `key`, or None if it is missing or damaged."""
         try:
-            document = json.loads(self.path(key).read_text(encoding="utf-8"))
+            document = json.loads(read_small_text(self.path(key), _LARGEST_FILE))
             return Record(**{name: document[name] for name in _NAMES})
         except (OSError, ValueError, KeyError, TypeError):
             return None

@@ -1,9 +1,10 @@
-"""List the files that a scene file may refer to, by a quick scan of its text instead of a full parse.
+"""List the files that a scene file may refer to, with the readers' own parsing of lines, headers and trees.
 
 The list errs on the side of too many files: an extra one only means that a change to it triggers another fit.
 Paths that leave the scene's folder are left out, since the readers reject them.
 """
 
+import contextlib
 import re
 import stat
 import struct
@@ -12,24 +13,23 @@ from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
+from vpltune.renderer.files.glb_container import GLB_MAGIC
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
 from vpltune.renderer.scene.files.json_object import parse_json
 from vpltune.renderer.scene.files.limits import MAX_FILE_BYTES
-from vpltune.renderer.scene.files.mtl_materials import MOST_LIBRARIES, map_statement
+from vpltune.renderer.scene.files.mtl_materials import MOST_LIBRARIES, map_statement, mtl_statements
+from vpltune.renderer.scene.files.obj_scene import library_names
+from vpltune.renderer.scene.files.ply_data import LONGEST_HEADER, parse_ply_header
+from vpltune.renderer.scene.files.text_lines import first_word, text_lines
+from vpltune.renderer.scene.mitsuba_import.xml_tree import XmlNode, parse_xml
 
-READ_SUFFIXES = (".gltf", ".glb", ".obj", ".ply")
-"""Extensions of the scene files that `read_scene` reads."""
 MITSUBA_SUFFIX = ".xml"
 """Extension of a Mitsuba scene."""
 
 # Magic, version, file length, length and type of the JSON chunk (glTF 2.0, section 4.4).
 _GLB_HEADER = struct.Struct("<4sIIII")
-# Attributes and lines that name a file.
-_XML_VALUE = re.compile(rb'value\s*=\s*"([^"]+\.[A-Za-z0-9]{2,4})"')
-_MTLLIB = re.compile(rb"^[ \t]*mtllib[ \t]+([^\r\n]+)", re.MULTILINE)
-_MAP = re.compile(rb"^[ \t]*map_Kd[ \t]+([^\r\n]+)", re.MULTILINE | re.IGNORECASE)
-_TEXTURE_FILE = re.compile(rb"^comment[ \t]+TextureFile[ \t]+([^\r\n]+)", re.MULTILINE)
-_PLY_HEADER_BYTES = 1 << 16  # a choice: far more than a usual header
+# An attribute of Mitsuba's XML that names a file.
+_FILE_NAME = re.compile(r".+\.[A-Za-z0-9]{2,4}")
 
 
 def referred_files(scene: Path) -> tuple[Path, ...]:
@@ -47,34 +47,30 @@ def is_mitsuba_scene(path: Path) -> bool:
 
 def _names(scene: Path) -> Iterator[str]:
     suffix = scene.suffix.lower()
-    if suffix == ".gltf":
-        yield from _gltf_uris(_content(scene))
-    elif suffix == ".glb":
-        yield from _gltf_uris(_glb_json(scene))
-    elif suffix == ".obj":
-        yield from _obj_names(scene)
-    elif suffix == ".ply":
-        for line in _TEXTURE_FILE.findall(_content(scene, _PLY_HEADER_BYTES)):
-            yield _text(line)
-    elif suffix == MITSUBA_SUFFIX:
-        for value in _XML_VALUE.findall(_content(scene)):
-            yield value.decode("utf-8", "replace")
+    # What breaks a rule is refused by the reader too; the names before it count.
+    with contextlib.suppress(SceneFileError):
+        if suffix in (".gltf", ".glb"):
+            yield from _gltf_uris(_gltf_json(scene))
+        elif suffix == ".obj":
+            yield from _obj_names(scene)
+        elif suffix == ".ply":
+            yield parse_ply_header(_content(scene, LONGEST_HEADER)).texture_name
+        elif suffix == MITSUBA_SUFFIX:
+            yield from _mitsuba_names(parse_xml(_content(scene)))
 
 
-def _glb_json(scene: Path) -> bytes:
-    """The JSON chunk of a .glb file, without reading the rest, which may be large."""
+def _gltf_json(scene: Path) -> bytes:
+    """A .gltf file, or the JSON chunk of a .glb file without the rest, which may be large."""
     head = _content(scene, _GLB_HEADER.size)
-    if len(head) < _GLB_HEADER.size:
-        return b""
+    # Decided by content, as the reader does.
+    if not head.startswith(GLB_MAGIC) or len(head) < _GLB_HEADER.size:
+        return _content(scene)
     length = _GLB_HEADER.unpack(head)[3]
     return _content(scene, _GLB_HEADER.size + length)[_GLB_HEADER.size :]
 
 
 def _gltf_uris(content: bytes) -> Iterator[str]:
-    try:
-        document = parse_json(content)
-    except SceneFileError:  # the reader refuses it too
-        return
+    document = parse_json(content)
     for kind in ("buffers", "images"):
         members = document.members.get(kind)
         for member in members if isinstance(members, list) else ():
@@ -94,23 +90,38 @@ def _obj_names(scene: Path) -> Iterator[str]:
         yield name
         if library not in read:
             read.add(library)
-            for mapped in dict.fromkeys(_MAP.findall(_content(library))):
-                yield map_statement(_text(mapped.split(b"#", 1)[0])).path
+            with contextlib.suppress(SceneFileError):
+                yield from dict.fromkeys(_map_names(_content(library), name))
+
+
+def _map_names(content: bytes, where: str) -> Iterator[str]:
+    for _, keyword, rest in mtl_statements(content, where):
+        if keyword.lower() == "map_kd":
+            yield map_statement(rest).path
 
 
 def _library_names(content: bytes) -> Iterator[str]:
     """Each once. A line holds one name that may contain spaces, or several names."""
     told: set[str] = set()
-    for line in _MTLLIB.findall(content):
-        text = _text(line)
-        for name in (text, *text.split()):
+    for _, line in text_lines(content, ""):
+        if b"mtllib" not in line or first_word(line)[0] != b"mtllib":
+            continue
+        names = library_names(line)
+        for name in (names, *names.split()):
             if name not in told:
                 told.add(name)
                 yield name
 
 
-def _text(line: bytes) -> str:
-    return line.decode("utf-8", "replace").strip()
+def _mitsuba_names(root: XmlNode) -> Iterator[str]:
+    """Values that end like a file's name."""
+    nodes = [root]
+    while nodes:
+        node = nodes.pop()
+        nodes += reversed(node.children)
+        name = node.attributes.get("value", "")
+        if _FILE_NAME.fullmatch(name):
+            yield name
 
 
 def _inside(folder: Path, name: str) -> Path | None:

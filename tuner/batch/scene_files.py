@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from vpltune.renderer.errors import InputError
-from vpltune.tuner.batch.referred_files import MITSUBA_SUFFIX, READ_SUFFIXES, is_mitsuba_scene, referred_files
+from vpltune.renderer.scene.files.scene_reader import SCENE_SUFFIXES
+from vpltune.tuner.batch.referred_files import MITSUBA_SUFFIX, is_mitsuba_scene, referred_files
 
 LONGEST_LIST_BYTES = 1 << 28
 """Largest list file that is read. A choice: room for millions of scenes."""
@@ -23,7 +24,7 @@ def library_scenes(library: Path, leave_out: Path) -> dict[str, Path]:
     library = library.absolute()
     if library.is_dir():
         scenes = {str(path.relative_to(library)): path for path in _below(library, leave_out.resolve())}
-        rule = f"has no {', '.join((*READ_SUFFIXES, MITSUBA_SUFFIX))} file below it"
+        rule = f"has no {', '.join((*SCENE_SUFFIXES, MITSUBA_SUFFIX))} file below it"
     else:
         scenes = {name: library.parent / name for name in _listed(library)}
         rule = "names no scene"
@@ -40,7 +41,7 @@ def _below(library: Path, leave_out: Path) -> list[Path]:
         found += (Path(folder, name) for name in sorted(files) if not name.startswith("."))
     mitsuba = [path for path in found if path.suffix.lower() == MITSUBA_SUFFIX and is_mitsuba_scene(path)]
     parts = {part for scene in mitsuba for part in referred_files(scene)}
-    read = [path for path in found if path.suffix.lower() in READ_SUFFIXES]
+    read = [path for path in found if path.suffix.lower() in SCENE_SUFFIXES]
     return sorted({*mitsuba, *read} - parts)
 
 

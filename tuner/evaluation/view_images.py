@@ -152,7 +152,9 @@ def read_view_images(path: Path) -> tuple[ViewImages, ...]:
         raise
     except _UNREADABLE as error:
         raise InputError(f"{path}: not a readable images.npz ({error})") from error
-    indices = sorted({int(name.partition("/")[0]) for name in members if name.partition("/")[0].isdecimal()})
+    places = {name.partition("/")[0] for name in members}
+    # Python refuses to read numbers of thousands of digits; no fit has 1e9 views.
+    indices = sorted({int(place) for place in places if place.isdecimal() and len(place) < 10})
     return tuple(_view(path, index, members) for index in indices)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from vpltune.renderer.scene.scene import Scene
 from vpltune.renderer.scene.views import View, light_to_json
 
-ESTIMATOR_VERSION = 1
+ESTIMATOR_VERSION = 2
 """Increase it whenever a code change makes the estimator return different values for the same input. Entries
 of older versions are then ignored."""
 

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float32
 
 from vpltune.renderer.scene.scene import Light
+from vpltune.renderer.scene.spot_cone import cone_scale
 from vpltune.tuner.reference.directions import cone_direction, disc_point
 from vpltune.tuner.reference.surfaces import Surface
 from vpltune.tuner.reference.unit_triangles import UnitTriangles
@@ -106,8 +107,7 @@ def _light_table(triangles: UnitTriangles, lights: tuple[Light, ...]) -> Float32
         least = -1.0
         if light.kind == "spot":
             least = np.cos(light.outer_cone)
-            # 1e-7 avoids a division by zero for equal angles, which give a hard edge.
-            scale = 1.0 / max(np.cos(light.inner_cone) - least, 1e-7)
+            scale = cone_scale(light.inner_cone, light.outer_cone)
             row[3, 1:] = scale, -least * scale
         area = BEAM_RADIUS**2 if at_infinity else 2.0 * (1.0 - least)
         row[4] = [1.0 / (math.pi * area), least, 0.0]

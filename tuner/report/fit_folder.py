@@ -9,6 +9,7 @@ from typing import Any
 
 from vpltune.renderer.config.config_versions import OLDER_NAMES
 from vpltune.renderer.errors import InputError
+from vpltune.renderer.files.small_text import read_small_text
 from vpltune.tuner.evaluation.view_images import ViewImages, read_view_images
 
 METRICS = "metrics.json"
@@ -37,6 +38,8 @@ _KINDS = {
     "pareto": list,
 }
 """Type of each key of metrics.json that a page reads. Every key is optional."""
+LARGEST_FILE = 1 << 28
+"""A choice: most bytes of a JSON file that a report reads: room for millions of scenes of a batch."""
 LARGEST_NUMBER = 1e100
 """A choice: what is larger is damage, and differences of it leave double precision."""
 _OF_OBJECTS = ("per_view", "pareto", "uncertainty")
@@ -111,10 +114,9 @@ def read_json_object(path: Path) -> dict[str, Any]:
     Raises:
         InputError: the file cannot be read, is not JSON, or holds another type of value.
     """
+    text = read_small_text(path, LARGEST_FILE)
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+        document = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: not JSON ({error})") from error
     if not isinstance(document, dict):

@@ -115,16 +115,16 @@ def parse_numbers(text: str, flag: str, counts: tuple[int, ...]) -> list[float]:
         counts: how many numbers are allowed.
 
     Raises:
-        InputError: there are more or fewer numbers, or one is not finite or beyond ±1e30.
+        InputError: there are more or fewer numbers, or one is not finite or too large.
     """
+    from vpltune.renderer.scene.files.plain_numbers import plain_number
+
     need = " or ".join(str(count) for count in counts)
     try:
-        # Python also reads 1_0 as a number.
-        numbers = [float(item) for item in text.split(",")] if text.isascii() and "_" not in text else []
+        numbers = [plain_number(item) for item in text.split(",")]
     except ValueError:
         numbers = []
-    # 1e30: its square still fits double precision, and views.json has the same limit.
-    if len(numbers) not in counts or not all(abs(number) <= 1e30 for number in numbers):
+    if len(numbers) not in counts:
         raise InputError(f"{flag}: must be {need} finite numbers separated by commas, got {text!r:.60}")
     return numbers
 

@@ -27,7 +27,7 @@ def with_flags(
             visibility.
     """
     given: dict[str, Any] = {
-        name: int(value) if isinstance(value, str) and value.isdecimal() else value
+        name: int(value) if isinstance(value, str) and _is_number(value) else value
         for name, value in quality.items()
         if value is not None
     }
@@ -49,6 +49,11 @@ def with_flags(
         # The budget was met with other settings.
         changed = replace(changed, quality=replace(changed.quality, **given, budget=None))
     return changed, notes
+
+
+def _is_number(text: str) -> bool:
+    # Python refuses to read numbers of thousands of digits; no setting has ten.
+    return text.isdecimal() and len(text) < 10
 
 
 def _is_default(name: str, value: object) -> bool:

@@ -22,6 +22,11 @@ def label(name: str, fallback: str) -> str:
     return one_line(name, 80) or fallback
 
 
+def mebibytes(count: int) -> str:
+    """A number of bytes that is too large, in MiB: rounded up, so that it exceeds a limit of whole MiB."""
+    return f"{-(-count >> 20):,} MiB"
+
+
 class Warnings:
     """Collects lines about what is ignored or approximated. Each appears once; similar cases are counted."""
 

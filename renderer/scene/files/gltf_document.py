@@ -4,14 +4,11 @@ import struct
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from vpltune.renderer.files.glb_container import BINARY_CHUNK, GLB_MAGIC, JSON_CHUNK
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
 from vpltune.renderer.scene.files.json_object import JsonObject, JsonObjects, parse_json
 from vpltune.renderer.scene.files.limits import DecodedBytes
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
-
-_GLB_MAGIC = b"glTF"
-# Chunk types "JSON" and "BIN": glTF 2.0, section 4.4.3.
-_JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 
 # Extensions that the readers support.
 READ_EXTENSIONS = frozenset(
@@ -100,7 +97,7 @@ def open_gltf(path: Path, warnings: Warnings) -> GltfDocument:
     if not content:
         raise SceneFileError("is empty")
     # Decide by content, because a .glb named .gltf is common.
-    is_binary = content.startswith(_GLB_MAGIC) or path.suffix.lower() == ".glb"
+    is_binary = content.startswith(GLB_MAGIC) or path.suffix.lower() == ".glb"
     json_chunk, binary_chunk = _glb_chunks(content) if is_binary else (content, None)
     document = GltfDocument(parse_json(json_chunk), folder, binary_chunk, warnings)
     _check_version(document.root)
@@ -112,19 +109,19 @@ def _glb_chunks(content: bytes) -> tuple[bytes, memoryview | None]:
     if len(content) < 20:
         raise SceneFileError(f"GLB header: must be at least 20 bytes, got {len(content)}")
     magic, version, length = struct.unpack_from("<4sII", content)
-    if magic != _GLB_MAGIC:
+    if magic != GLB_MAGIC:
         raise SceneFileError(f"GLB header: must begin with 'glTF', got {magic!r}")
     if version != 2:
         raise SceneFileError(f"GLB header: version must be 2, got {version}")
     if length > len(content):
         raise SceneFileError(f"GLB header: says {length} bytes, but the file is cut off after {len(content)}")
     kind, json_chunk, end = _glb_chunk(content, 12, length)
-    if kind != _JSON_CHUNK:
+    if kind != JSON_CHUNK:
         raise SceneFileError(f"GLB: the first chunk must be JSON, got type {kind:#x}")
     # Only the second chunk can be the binary buffer. Chunks of other types must be ignored.
     if end + 8 <= length:
         kind, binary_chunk, _ = _glb_chunk(content, end, length)
-        if kind == _BINARY_CHUNK:
+        if kind == BINARY_CHUNK:
             return bytes(json_chunk), binary_chunk
     return bytes(json_chunk), None
 

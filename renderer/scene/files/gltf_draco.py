@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,8 @@ from vpltune.renderer.scene.files.diagnostics import SceneFileError
 from vpltune.renderer.scene.files.gltf_accessors import Elements, GltfAccessors
 from vpltune.renderer.scene.files.json_object import JsonObject
 from vpltune.renderer.scene.files.limits import DRACO_BYTES_PER_SECOND, DRACO_SECONDS, DecodedBytes
+
+_PROGRAM = Path(__file__).with_name("draco_process.py")
 
 
 class DracoDecoder:
@@ -48,7 +51,7 @@ class DracoDecoder:
         seconds = DRACO_SECONDS + len(content) // DRACO_BYTES_PER_SECOND
         answer = self._answer({"seconds": seconds, "length": len(content), "ids": ids}, content)
         if "arrays" not in answer:
-            cause = answer.get("error", f"the decoder crashed, or took more than {seconds} s")
+            cause = answer["error"] if "error" in answer else self._end(seconds)
             raise SceneFileError(f"{where}: Draco cannot decode it ({cause})")
         vertex_count, corner_count = counts
         (faces_type, (held,)), *stored = answer["arrays"]
@@ -61,11 +64,14 @@ class DracoDecoder:
                     f"{where}: holds {shape[0]} vertices of {math.prod(shape) // max(shape[0], 1)} "
                     f"components, but its accessor says {vertex_count}, and at most 4 are allowed"
                 )
-        corners = self._array(faces_type, [held]).astype(np.int64)
-        return corners, {
-            unique_id: self._array(dtype, shape)
-            for unique_id, (dtype, shape) in zip(answer["ids"], stored, strict=True)
-        }
+        try:
+            corners = self._array(faces_type, [held]).astype(np.int64)
+            return corners, {
+                unique_id: self._array(dtype, shape)
+                for unique_id, (dtype, shape) in zip(answer["ids"], stored, strict=True)
+            }
+        except EOFError as error:
+            raise SceneFileError(f"{where}: Draco cannot decode it ({self._end(seconds)})") from error
 
     def _answer(self, request: dict[str, Any], content: memoryview) -> dict[str, Any]:
         """The line that answers a request; empty if the process has ended."""
@@ -83,14 +89,27 @@ class DracoDecoder:
     def _array(self, dtype: str, shape: list[int]) -> np.ndarray:
         process = self._started()
         assert process.stdout is not None
-        content = process.stdout.read(math.prod(shape) * np.dtype(dtype).itemsize)
+        length = math.prod(shape) * np.dtype(dtype).itemsize
+        content = process.stdout.read(length)
+        if len(content) < length:
+            raise EOFError
         return np.frombuffer(content, dtype).reshape(shape)
+
+    def _end(self, seconds: int) -> str:
+        """Why the process has ended, or ends now, as its return code tells."""
+        code = self._started().wait()
+        if code >= 0:
+            return f"the decoder ended with exit code {code}"
+        # Windows has no SIGXCPU, and no limit of time.
+        if code == -getattr(signal, "SIGXCPU", 0):
+            return f"it took more than {seconds} s"
+        return f"the decoder was ended by {signal.Signals(-code).name}"
 
     def _started(self) -> subprocess.Popen[bytes]:
         if self._process is None:
             paths = os.pathsep.join(path for path in sys.path if path)
             self._process = subprocess.Popen(
-                [sys.executable, "-P", str(Path(__file__).with_name("draco_process.py"))],
+                [sys.executable, "-P", str(_PROGRAM)],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 # One thread: each further one of numpy's reserves address space.

@@ -10,7 +10,7 @@ from vpltune.renderer.scene.files.gltf_document import GltfDocument
 from vpltune.renderer.scene.files.json_object import JsonObject
 from vpltune.renderer.scene.files.limits import LARGEST_RADIOMETRIC
 from vpltune.renderer.scene.scene import Camera, Light, without_scale
-from vpltune.renderer.scene.spot_cone import softened
+from vpltune.renderer.scene.spot_cone import checked_cone
 
 
 def read_camera(
@@ -101,19 +101,15 @@ def _cone(light: JsonObject, document: GltfDocument) -> tuple[float, float]:
     spot = light.object("spot") or JsonObject({}, light.at("spot"))
     inner = spot.number("innerConeAngle", 0.0)
     outer = spot.number("outerConeAngle", math.pi / 4)
-    # 1e-6 accepts π/2 in single precision.
-    if not (0.0 <= inner <= outer <= math.pi / 2 + 1e-6 and outer > 0.0):
-        raise SceneFileError(
-            f"{spot.where}: cone angles must satisfy 0 ≤ innerConeAngle < outerConeAngle ≤ π/2, "
-            f"got {inner:g} and {outer:g}"
-        )
+    cone = checked_cone(
+        inner, outer, "radians", spot.where, ("innerConeAngle", "outerConeAngle"), error=SceneFileError
+    )
     if inner == outer:
-        # Not allowed by KHR_lights_punctual, but Blender writes it for a spot without blend.
         document.warnings.tally(
             "1 spot has equal cone angles; it has a hard edge",
             "{n} spots have equal cone angles; they have hard edges",
         )
-    return softened(inner, min(outer, math.pi / 2))
+    return cone
 
 
 def _unit(vector: Float64[np.ndarray, "3"], where: str) -> Float64[np.ndarray, "3"]:

@@ -69,7 +69,7 @@ class _SceneBuilder:
         self._surfaces: dict[str, list[JsonObject]] = {}
         self._skins: dict[RestSkin, int] = {}
         self._meshes_at_rest: dict[tuple[str, Deformation], int | None] = {}
-        self._placed: Counter[str] = Counter()
+        self._counts: Counter[str] = Counter()
 
     def add_node(self, index: int) -> None:
         node = self.nodes.nodes[index]
@@ -94,8 +94,8 @@ class _SceneBuilder:
 
     def _count(self, added: int, what: str, most: int) -> None:
         # What a node places counts even if nothing of it is drawn: it takes its time all the same.
-        self._placed[what] += added
-        if self._placed[what] > most:
+        self._counts[what] += added
+        if self._counts[what] > most:
             raise SceneFileError(f"nodes: must place at most {most:,} {what} in all")
 
     def _light_of(self, node: JsonObject) -> JsonObject | None:

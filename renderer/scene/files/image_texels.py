@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import UInt8
 from PIL import Image
 
-from vpltune.renderer.scene.files.diagnostics import SceneFileError
+from vpltune.renderer.scene.files.diagnostics import SceneFileError, mebibytes
 from vpltune.renderer.scene.files.limits import (
     FREE_TEXELS,
     MAX_IMAGE_BYTES,
@@ -45,7 +45,7 @@ class ImageDecoder:
         if len(content) > MAX_IMAGE_BYTES:
             raise SceneFileError(
                 f"{where}: an image file must have at most {MAX_IMAGE_BYTES >> 20} MiB, "
-                f"got {len(content) >> 20} MiB"
+                f"got {mebibytes(len(content))}"
             )
         try:
             # Opening reads the header only, so the size is checked before anything is unpacked.

@@ -10,12 +10,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float64
 
-from vpltune.renderer.files.strict_json import DuplicateKeyError, unique_keys
-from vpltune.renderer.scene.files.diagnostics import SceneFileError
-from vpltune.renderer.scene.files.limits import MAX_JSON_BYTES, MAX_JSON_VALUES
-
-# A choice: numbers beyond this are rejected, so that sums and products stay finite in float64.
-_LARGEST_NUMBER = 1e30
+from vpltune.renderer.files.strict_json import DuplicateKeyError, no_constant, unique_keys
+from vpltune.renderer.scene.files.diagnostics import SceneFileError, mebibytes
+from vpltune.renderer.scene.files.limits import LARGEST_NUMBER, MAX_JSON_BYTES, MAX_JSON_VALUES
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,12 +178,12 @@ def parse_json(content: bytes) -> JsonObject:
         if sys.getsizeof(text) > MAX_JSON_BYTES:
             raise SceneFileError(
                 f"the document: JSON must take at most {MAX_JSON_BYTES >> 20} MiB as text, "
-                f"got {sys.getsizeof(text) >> 20} MiB; put large buffers into a .glb or .bin"
+                f"got {mebibytes(sys.getsizeof(text))}; put large buffers into a .glb or .bin"
             )
         document = json.loads(
             text,
             object_pairs_hook=unique_keys,
-            parse_constant=_no_constant,
+            parse_constant=no_constant,
             parse_float=_finite_float,
         )
     except SceneFileError:
@@ -235,7 +232,7 @@ def _as_object(value: Any, where: str) -> JsonObject:
 
 def _is_number(value: Any) -> bool:
     # In Python, bool is a subclass of int.
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _LARGEST_NUMBER
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST_NUMBER
 
 
 def _whole(value: Any) -> int | None:
@@ -243,10 +240,6 @@ def _whole(value: Any) -> int | None:
         return None
     # Beyond 2**53 a double cannot represent every whole number.
     return int(value) if value == value // 1 and abs(value) <= 2**53 else None
-
-
-def _no_constant(name: str) -> float:
-    raise SceneFileError(f"the document: {name} is not a JSON number")
 
 
 def _finite_float(text: str) -> float:

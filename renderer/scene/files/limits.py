@@ -1,12 +1,15 @@
 """Size limits of scenes, checked before memory is allocated: a file of a kilobyte can ask for a terabyte."""
 
-from vpltune.renderer.scene.files.diagnostics import SceneFileError
+from vpltune.renderer.scene.files.diagnostics import SceneFileError, mebibytes
 
 MAX_FILE_BYTES = 1 << 29
 """A choice: all files of a scene together, half of the 1 GiB that reading a scene may take."""
 
 MAX_DECODED_BYTES = 1 << 29
-"""A choice: all vertex and index arrays, the other half. That is about six million flat-shaded triangles."""
+"""A choice: all vertex and index arrays, the other half. That is 4.07 million flat-shaded triangles of glTF.
+
+Each takes 132 bytes: three corners with position, normal, uv and colour in single precision.
+"""
 
 MAX_JSON_BYTES = 1 << 27
 """A choice: JSON text in memory. File, text, a string of it and what that encodes lie side by side."""
@@ -62,6 +65,9 @@ TEXELS_PER_BYTE = 64
 A photograph has 2 to 10 texels per byte. A file that unpacks a kilobyte to a megabyte has hundreds.
 """
 
+LARGEST_NUMBER = 1e30
+"""A choice: largest number in any file. It fits float32, and the product of two fits double precision."""
+
 LARGEST_COORDINATE = 1e12
 """In world units. A choice: kilometres in millimetres, with six digits to spare."""
 
@@ -70,6 +76,7 @@ LARGEST_NORMAL = 3.4e38
 
 SMALLEST_EXTENT = 1e-12
 """Smallest diagonal of a scene in world units. A choice, like the largest coordinate."""
+
 LARGEST_RADIOMETRIC = 1e18
 """A choice: largest intensity of a light, W/sr or W/m². Times any albedo and area it is finite in float32."""
 
@@ -99,7 +106,7 @@ class DecodedBytes:
         if count > self._left:
             raise SceneFileError(
                 f"{where}: {self._what} must take at most {self._most >> 20} MiB once decoded, and this "
-                f"needs {count >> 20} MiB with {self._left >> 20} MiB left"
+                f"needs {mebibytes(count)} with {self._left >> 20} MiB left"
             )
 
     def spend(self, count: int, where: str) -> None:

@@ -1,5 +1,6 @@
 """Wavefront MTL: the diffuse colour and map of materials. A diffuse material has no use for the rest."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,6 +75,24 @@ def map_statement(rest: str) -> MapStatement:
             at += 1 + _MAP_OPTIONS.get(option, 0)
     path = rest.split(None, at)[at] if at < len(words) else ""
     return MapStatement(path.strip(), clamps, tuple(dict.fromkeys(ignored)))
+
+
+def mtl_statements(content: bytes, where: str) -> Iterator[tuple[int, str, str]]:
+    """Line number, keyword and rest of each statement of a material library, without comments.
+
+    Args:
+        content: of the library.
+        where: its name, for messages.
+
+    Raises:
+        SceneFileError: the content is no text in an encoding that keeps ASCII, or a line is too long.
+    """
+    for number, line in text_lines(content, where):
+        keyword, rest = first_word(without_remark(line))
+        if keyword.lower() not in _NAMING:
+            rest = rest.partition("#")[0].strip()
+        if keyword:
+            yield number, keyword.decode("utf-8", "replace"), rest
 
 
 class MtlMaterials:
@@ -174,17 +193,13 @@ class MtlMaterials:
         except SceneFileError:
             return False
         definition: _Definition | None = None
-        for number, line in text_lines(content, f"{name!r:.80}"):
-            keyword, rest = first_word(without_remark(line))
-            if keyword.lower() not in _NAMING:
-                rest = rest.partition("#")[0].strip()
-            if keyword == b"newmtl":
+        for number, keyword, rest in mtl_statements(content, f"{name!r:.80}"):
+            if keyword == "newmtl":
                 definition = self._definitions.setdefault(rest, _Definition())
                 if len(self._definitions) > _MOST_DEFINITIONS:
                     raise SceneFileError(f"{name!r:.80}: must define at most {_MOST_DEFINITIONS:,} materials")
-            elif definition is not None and keyword:
-                where = f"{name!r:.80} line {number}"
-                self._read_statement(definition, keyword.decode("utf-8", "replace"), rest, where)
+            elif definition is not None:
+                self._read_statement(definition, keyword, rest, f"{name!r:.80} line {number}")
         return True
 
     def _read_statement(self, definition: _Definition, keyword: str, rest: str, where: str) -> None:
@@ -235,6 +250,7 @@ class MtlMaterials:
 
 
 def _leading_number(text: str, absent: float) -> float:
+    """What is no number counts as absent: opacity changes no image, so it makes no scene unusable."""
     words = text.split()
     return plain_number(words[0]) if words and _is_number(words[0]) else absent
 

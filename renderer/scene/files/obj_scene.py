@@ -101,7 +101,7 @@ def _parse(content: bytes, warnings: Warnings, decoded: DecodedBytes) -> _ObjTex
         elif keyword == b"usemtl":
             material = first_word(without_remark(line))[1]
         elif keyword == b"mtllib":
-            text.libraries[first_word(without_remark(line))[1]] = None
+            text.libraries[library_names(line)] = None
         elif keyword in (b"p", b"l"):
             warnings.tally("1 point or line element is ignored", "{n} point or line elements are ignored")
         elif keyword in _FREE_FORM_KEYWORDS:
@@ -111,6 +111,11 @@ def _parse(content: bytes, warnings: Warnings, decoded: DecodedBytes) -> _ObjTex
                 "1 line with an unknown keyword is ignored", "{n} lines with unknown keywords are ignored"
             )
     return text
+
+
+def library_names(line: bytes) -> str:
+    """What an `mtllib` line names: one library whose name may have spaces, or several."""
+    return first_word(without_remark(line))[1]
 
 
 def _words(line: bytes) -> list[bytes]:

@@ -3,9 +3,7 @@
 import math
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
-
-LARGEST_NUMBER = 1e30
-"""A choice: larger coordinates make no sense, and their products would overflow float32."""
+from vpltune.renderer.scene.files.limits import LARGEST_NUMBER
 
 
 def plain_number(word: str | bytes) -> float:

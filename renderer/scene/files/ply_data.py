@@ -24,8 +24,8 @@ _BYTE_ORDERS: dict[str, Literal["<", ">", ""]] = {
     "ascii": "",
 }
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-# A choice: most bytes of a header.
-_LONGEST_HEADER = 1 << 16
+LONGEST_HEADER = 1 << 16
+"""A choice: most bytes of a header."""
 # A line of its own: comments may hold the word too.
 _END_OF_HEADER = re.compile(rb"[\r\n](end_header)[ \t]*(?=[\r\n]|$)")
 # A choice: bytes of ASCII data that are split at a time. A word takes 40 bytes of memory then.
@@ -82,7 +82,7 @@ def parse_ply_header(content: bytes) -> PlyHeader:
         SceneFileError: the content does not start with a valid PLY header.
     """
     begin = len(_BYTE_ORDER_MARK) if content.startswith(_BYTE_ORDER_MARK) else 0
-    ended = _END_OF_HEADER.search(content, begin, _LONGEST_HEADER)
+    ended = _END_OF_HEADER.search(content, begin, LONGEST_HEADER)
     if not content.startswith(b"ply", begin) or ended is None:
         raise SceneFileError("header: must begin with 'ply' and end with 'end_header'")
     end, size = ended.start(1), ended.end()

@@ -12,7 +12,7 @@ from jaxtyping import Float32, Float64, Int64
 from vpltune.renderer.files.srgb import linear_from_srgb
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, label
 from vpltune.renderer.scene.files.image_texels import MTL_FORMATS, ImageDecoder
-from vpltune.renderer.scene.files.limits import DecodedBytes
+from vpltune.renderer.scene.files.limits import LARGEST_NUMBER, DecodedBytes
 from vpltune.renderer.scene.files.ply_data import PlyColumn, PlyData, PlyHeader, parse_ply_header
 from vpltune.renderer.scene.files.polygon_triangulation import triangulated
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
@@ -122,8 +122,7 @@ def _stacked(
     if not all(name in columns and columns[name].sizes is None for name in names):
         return None
     stacked = np.stack([columns[name].values for name in names], axis=1)
-    # Larger coordinates make no sense and would overflow float32.
-    if not (np.abs(stacked) <= 1e30).all():
+    if not (np.abs(stacked) <= LARGEST_NUMBER).all():
         raise SceneFileError(f"{where}: {', '.join(names)} must be finite")
     return stacked
 
@@ -140,7 +139,7 @@ def _corner_uv(face: Columns, sizes: Int64[np.ndarray, " faces"]) -> Float32[np.
     texcoord = face.get("texcoord")
     if texcoord is None or texcoord.sizes is None or not texcoord.values.size:
         return None
-    if (texcoord.sizes != 2 * sizes).any() or not (np.abs(texcoord.values) <= 1e30).all():
+    if (texcoord.sizes != 2 * sizes).any() or not (np.abs(texcoord.values) <= LARGEST_NUMBER).all():
         raise SceneFileError("element 'face': texcoord must have two finite numbers for each corner")
     return _flipped_v(texcoord.values.reshape(-1, 2))
 

@@ -4,7 +4,7 @@ import os
 import stat
 from pathlib import Path
 
-from vpltune.renderer.scene.files.diagnostics import SceneFileError
+from vpltune.renderer.scene.files.diagnostics import SceneFileError, mebibytes
 from vpltune.renderer.scene.files.limits import MAX_FILE_BYTES
 
 
@@ -68,7 +68,7 @@ class SceneFolder:
                     raise SceneFileError(f"{subject}is not a regular file")
                 if found.st_size > self._left:
                     raise SceneFileError(
-                        f"{subject}has {found.st_size >> 20} MiB, and all files of a scene together must "
+                        f"{subject}has {mebibytes(found.st_size)}, and all files of a scene together must "
                         f"have at most {MAX_FILE_BYTES >> 20} MiB"
                     )
                 content = file.read(found.st_size)

@@ -15,6 +15,8 @@ _READERS = {
     ".obj": ("obj_scene", "read_obj"),
     ".ply": ("ply_scene", "read_ply"),
 }
+SCENE_SUFFIXES = tuple(_READERS)
+"""Suffixes of the files that `read_scene` reads."""
 
 
 def read_scene(path: str | Path) -> Scene:
@@ -35,6 +37,8 @@ def _reader_for(path: Path) -> Callable[[Path, Warnings], Scene]:
     if suffix == ".xml":
         raise SceneFileError("Mitsuba XML is not read directly; convert it to a .glb with `vpltune import`")
     if suffix not in _READERS:
-        raise SceneFileError(f"a scene must be one of {', '.join(_READERS)}, got {suffix or 'no suffix'!r}")
+        raise SceneFileError(
+            f"a scene must be one of {', '.join(SCENE_SUFFIXES)}, got {suffix or 'no suffix'!r}"
+        )
     module, function = _READERS[suffix]
     return getattr(importlib.import_module(f"vpltune.renderer.scene.files.{module}"), function)

@@ -19,7 +19,7 @@ from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
 from vpltune.renderer.scene.scene import Light
-from vpltune.renderer.scene.spot_cone import softened
+from vpltune.renderer.scene.spot_cone import checked_cone
 
 # A choice: an emitter faces one direction if the vector sum of its triangles' areas is at least this share
 # of its area.
@@ -163,22 +163,18 @@ def _position(emitter: Plugin) -> Float64[np.ndarray, "3"]:
 
 
 def _spot(emitter: Plugin, warnings: Warnings) -> tuple[Light, float]:
-    outer = math.radians(emitter.number("cutoff_angle", 20.0))
-    inner = math.radians(emitter.number("beam_width", math.degrees(outer) * 0.75))
-    if not (0.0 <= inner <= outer <= math.pi and outer > 0.0):
-        raise SceneFileError(
-            f"{emitter.where}: must have 0 ≤ beam_width ≤ cutoff_angle ≤ 180 degrees, "
-            f"got {math.degrees(inner):g} and {math.degrees(outer):g}"
-        )
-    if outer > math.pi / 2.0:
+    cutoff = emitter.number("cutoff_angle", 20.0)
+    beam = emitter.number("beam_width", 0.75 * cutoff)
+    inner, outer = checked_cone(
+        beam, cutoff, "degrees", emitter.where, ("beam_width", "cutoff_angle"), 180.0, SceneFileError
+    )
+    if cutoff > 90.0:
         warnings.tally(
             "1 spot shines wider than 90° from its axis; it ends there",
             "{n} spots shine wider than 90° from their axes; they end there",
         )
-        inner, outer = min(inner, math.pi / 2.0), math.pi / 2.0
-    if inner == outer:
+    if min(beam, 90.0) == min(cutoff, 90.0):
         warnings.tally("1 spot has a hard edge", "{n} spots have hard edges")
-    inner, outer = softened(inner, outer)
     warnings.tally(
         "1 spot falls off between its two angles as in glTF, not linearly with the angle as in Mitsuba",
         "{n} spots fall off between their two angles as in glTF, not linearly with the angle as in Mitsuba",

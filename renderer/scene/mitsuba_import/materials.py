@@ -101,7 +101,7 @@ class MaterialReader:
             return self._blend(bsdf)
         if bsdf.type not in _DIFFUSE_NAMES:
             raise SceneFileError(f"{bsdf.where}: unsupported material type")
-        if bsdf.child("metallic") is not None or _is_metallic(bsdf):
+        if _is_metallic(bsdf):
             self._warnings.tally(
                 "1 principled material is metallic, which is drawn as matt",
                 "{n} principled materials are metallic, which is drawn as matt",
@@ -209,7 +209,10 @@ class MaterialReader:
 
 
 def _is_metallic(bsdf: Plugin) -> bool:
-    return bsdf.type == "principled" and bsdf.number("metallic", 0.0) > 0.0
+    # A plastic may have a child of that name too; Mitsuba has no use for it.
+    return bsdf.type == "principled" and (
+        bsdf.child("metallic") is not None or bsdf.number("metallic", 0.0) > 0.0
+    )
 
 
 def _to_uv(texture: Plugin) -> Float64[np.ndarray, "3 3"]:

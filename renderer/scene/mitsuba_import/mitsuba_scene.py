@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
-from vpltune.renderer.scene.files.limits import MAX_INSTANCES, DecodedBytes
+from vpltune.renderer.scene.files.limits import LARGEST_RADIOMETRIC, MAX_INSTANCES, DecodedBytes
 from vpltune.renderer.scene.files.plain_numbers import plain_number
 from vpltune.renderer.scene.files.reading_border import read_at_border
 from vpltune.renderer.scene.files.surface import finished_mesh
@@ -66,7 +66,7 @@ class _Import:
             elif (placed := self._mesh(plugin)) is not None:
                 self._place(Instance(f"{plugin.type} {placed[0]}", *placed), plugin)
         if not self.instances:
-            raise SceneFileError("the scene has no triangles")
+            return Scene(self.path.stem, (), (), (), warnings=self.warnings.lines())
         scene = Scene(
             name=self.path.stem if self.path.stem != "scene" else self.path.resolve().parent.name,
             meshes=tuple(self.meshes),
@@ -80,6 +80,7 @@ class _Import:
             found = punctual_light(emitter, self.folder, extent, self.warnings)
             if found is not None:
                 self.lights.append(found)
+        self._check_lights()
         self._warn_unread(root)
         cameras = tuple(camera for sensor in root.of_kind("sensor") if (camera := self._camera(sensor)))
         if not self.lights:
@@ -111,6 +112,15 @@ class _Import:
             return None
         self.meshes.append(mesh)
         return len(self.meshes) - 1, to_world
+
+    def _check_lights(self) -> None:
+        for light, _ in self.lights:
+            strongest_channel = float(light.intensity.max())
+            if not strongest_channel <= LARGEST_RADIOMETRIC:
+                raise SceneFileError(
+                    f"{light.name}: its intensity must be at most {LARGEST_RADIOMETRIC:g}, "
+                    f"got {strongest_channel:g}"
+                )
 
     def _warn_no_area(self) -> None:
         self.warnings.tally(
@@ -211,7 +221,7 @@ def _vertical_angle(sensor: Plugin, width: float, height: float) -> float:
         try:
             focal = plain_number(text)
         except ValueError:
-            focal = math.nan
+            focal = 0.0
         if not 0.0 < focal < 1e6:
             raise SceneFileError(f"{sensor.where}: focal_length must be like '50mm', got {text!r:.40}")
         angle, axis = 2.0 * math.atan(math.hypot(36.0, 24.0) / 2.0 / focal), "diagonal"

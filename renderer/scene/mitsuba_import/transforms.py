@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
+from vpltune.renderer.scene.files.limits import LARGEST_NUMBER
 from vpltune.renderer.scene.mitsuba_import.values import numbers, vector
 from vpltune.renderer.scene.mitsuba_import.xml_tree import XmlNode
 
@@ -24,7 +25,7 @@ def transform(node: XmlNode) -> Matrix:
         if make is None:
             raise SceneFileError(f"{step.where}: must be one of {', '.join(_STEPS)}")
         matrix = make(step) @ matrix
-    if not (np.abs(matrix).max() < 1e30 and abs(np.linalg.det(matrix[:3, :3])) > 0.0):
+    if not (np.abs(matrix).max() <= LARGEST_NUMBER and abs(np.linalg.det(matrix[:3, :3])) > 0.0):
         raise SceneFileError(f"{node.where}: the transform must be finite and have an inverse")
     return matrix
 

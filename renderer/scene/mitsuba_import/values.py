@@ -1,6 +1,5 @@
 """Numbers, vectors and colours in the attributes of Mitsuba's XML."""
 
-import math
 import re
 
 import numpy as np
@@ -36,8 +35,8 @@ def numbers(node: XmlNode, key: str, count: int) -> Float64[np.ndarray, " count"
     try:
         found = [plain_number(word) for word in words]
     except ValueError:
-        found = [math.nan]
-    if len(found) != count or math.isnan(found[0]):
+        found = []
+    if len(found) != count:
         plural = "s" * (count > 1)
         raise SceneFileError(
             f"{node.where}: {key} must be {count} finite number{plural}, got {node.attributes[key]!r:.60}"
@@ -79,12 +78,11 @@ def color(node: XmlNode) -> Float64[np.ndarray, "3"]:
 
 def _sampled_spectrum(node: XmlNode, text: str) -> Float64[np.ndarray, "3"]:
     try:
-        pairs = np.array(
-            [[plain_number(part) for part in word.split(":")] for word in text.replace(",", " ").split()]
-        )
+        found = [[plain_number(part) for part in word.split(":")] for word in text.replace(",", " ").split()]
     except ValueError:
-        pairs = np.full((1, 2), math.nan)
-    if pairs.ndim != 2 or pairs.shape[1] != 2 or np.isnan(pairs).any():
+        found = []
+    if not found or any(len(pair) != 2 for pair in found):
         raise SceneFileError(f"{node.where}: a spectrum must be wavelength:value pairs, got {text!r:.60}")
+    pairs = np.array(found)
     pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
     return np.array([np.interp(np.linspace(*band, 16), pairs[:, 0], pairs[:, 1]).mean() for band in _BANDS])

@@ -27,6 +27,7 @@ from jaxtyping import Float64
 
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.small_text import read_small_text
+from vpltune.renderer.scene.files.limits import LARGEST_RADIOMETRIC
 from vpltune.renderer.scene.placement.automatic_camera import default_camera, default_camera_for_lights
 from vpltune.renderer.scene.placement.automatic_light import default_light
 from vpltune.renderer.scene.placement.sidecar_file import near_miss, sidecar_path
@@ -47,8 +48,8 @@ LIGHT_KEYS: dict[LightKind, tuple[str, ...]] = {
     "point": ("type", "position", "intensity"),
     "directional": ("type", "direction", "look_at", "position", "intensity"),
 }
-# A choice: largest number, a place or an intensity; scenes lie within 1e12 units, and a sun may stand beyond.
-LARGEST = 1e18
+# A choice: largest coordinate. Scenes lie within 1e12, a sun may stand beyond; its square fits float32.
+LARGEST_PLACE = 1e18
 # A choice: most bytes of a sidecar, which usually has 500.
 _LARGEST_FILE = 1 << 20
 # A choice: if the scene file's lights reach a smaller share of the image than this, they are replaced.
@@ -172,7 +173,7 @@ def _check_keys(table: Any, allowed: tuple[str, ...], where: str) -> None:
 
 
 def _numbers(
-    table: dict[str, Any], key: str, counts: tuple[int, ...], where: str
+    table: dict[str, Any], key: str, counts: tuple[int, ...], where: str, most: float = LARGEST_PLACE
 ) -> Float64[np.ndarray, " n"]:
     if key not in table:
         raise InputError(f"{where}: key '{key}' is missing")
@@ -180,11 +181,11 @@ def _numbers(
     items = value if isinstance(value, list) else [value]
     # TOML has inf and nan, and bool is a subclass of int.
     plain = all(isinstance(item, int | float) and not isinstance(item, bool) for item in items)
-    if not plain or len(items) not in counts or not all(abs(item) <= LARGEST for item in items):
+    if not plain or len(items) not in counts or not all(abs(item) <= most for item in items):
         wanted = " or ".join(str(count) for count in counts)
         raise InputError(
             f"{where}: '{key}' must be {wanted} finite number{'s' * (counts != (1,))}, got {value!r:.60}; "
-            f"at most {LARGEST:g} each"
+            f"at most {most:g} each"
         )
     return np.array(items, np.float64)
 
@@ -205,7 +206,7 @@ def _light(table: Any, where: str) -> Light:
     if not isinstance(kind, str) or kind not in LIGHT_KEYS:
         raise InputError(f"{where}: 'type' must be 'spot', 'point' or 'directional', got {kind!r:.60}")
     _check_keys(table, LIGHT_KEYS[kind], where)
-    intensity = _numbers(table, "intensity", (1, 3), where)
+    intensity = _numbers(table, "intensity", (1, 3), where, LARGEST_RADIOMETRIC)
     if (intensity < 0.0).any():
         raise InputError(f"{where}: 'intensity' must not be negative, got {intensity.tolist()}")
     placed: dict[str, Any] = {}

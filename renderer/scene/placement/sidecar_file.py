@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float64
 
+from vpltune.renderer.scene.files.scene_reader import SCENE_SUFFIXES
 from vpltune.renderer.scene.scene import Camera, Light
 
 SIDECAR_SUFFIX = ".vpltune.toml"
 """What takes the place of the scene's own suffix."""
-_SCENE_SUFFIXES = (".gltf", ".glb", ".obj", ".ply")
 # A choice: names and suffixes that are at least this alike (Ratcliff and Obershelp 1988) are taken for slips.
 _ALIKE = 0.85
 
@@ -33,7 +33,7 @@ def near_miss(scene_path: Path) -> str | None:
         names = sorted(file.name for file in right.parent.iterdir())
     except OSError:
         return None
-    stems = {Path(name).stem for name in names if name.lower().endswith(_SCENE_SUFFIXES)}
+    stems = {Path(name).stem for name in names if name.lower().endswith(SCENE_SUFFIXES)}
     return next((name for name in names if name != right.name and _is_slip(name, right, stems)), None)
 
 
@@ -45,7 +45,7 @@ def _is_slip(name: str, right: Path, stems: set[str]) -> bool:
     is_text = ".toml" in last or last.count(".") == 0 or _alike(Path(lower).suffix, ".toml")
     if not is_text or (name.endswith(SIDECAR_SUFFIX) and name.removesuffix(SIDECAR_SUFFIX) in stems - {stem}):
         return False
-    for suffix in _SCENE_SUFFIXES:
+    for suffix in SCENE_SUFFIXES:
         first = first.removesuffix(suffix)
     return first == stem.lower() or (len(stem) > 3 and _alike(first, stem.lower()))
 

@@ -344,7 +344,7 @@ def test_lights_that_cannot_be_are_refused(field, value, message):
 def test_records_of_another_kind_are_refused():
     with pytest.raises(ValueError, match="must be .n. of DYNAMIC_LIGHT_DTYPE, got .3, 12. float32"):
         DynamicLights(np.zeros((3, 12), np.float32))
-    with pytest.raises(ValueError, match="cone angles must satisfy 0 ≤ inner < outer ≤ π/2, got 0.5 and 0.4"):
+    with pytest.raises(ValueError, match="spot_lights: cone angles must satisfy .*, got 0.5 and 0.4"):
         spot((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0, 0.5, 0.4)
 
 

@@ -140,15 +140,50 @@ def test_hard_and_wide_spots_come_over_with_a_word(tmp_path, beam, cutoff, degre
 
 def test_a_beam_wider_than_its_cutoff_is_refused(tmp_path):
     spot = '<emitter type="spot"><float name="beam_width" value="40"/></emitter>'
-    with pytest.raises(InputError, match="beam_width ≤ cutoff_angle ≤ 180 degrees, got 40 and 20"):
+    with pytest.raises(InputError, match=r"beam_width ≤ cutoff_angle ≤ 180 degrees .*, got 40 and 20"):
         read(tmp_path, CUBE + spot)
 
 
-@pytest.mark.parametrize(("metallic", "is_said"), [("0", False), ("0.8", True)])
-def test_a_metallic_material_is_said(tmp_path, metallic, is_said):
-    bsdf = f'<bsdf type="principled"><float name="metallic" value="{metallic}"/></bsdf>'
+METALLIC_MAP = '<texture type="checkerboard" name="metallic"/>'
+
+
+@pytest.mark.parametrize(
+    ("kind", "metallic", "is_said"),
+    [
+        ("principled", '<float name="metallic" value="0"/>', False),
+        ("principled", '<float name="metallic" value="0.8"/>', True),
+        ("principled", METALLIC_MAP, True),
+        ("plastic", METALLIC_MAP, False),
+    ],
+)
+def test_a_metallic_material_is_said(tmp_path, kind, metallic, is_said):
+    """A principled one: no other is metallic, whatever it is given."""
+    bsdf = f'<bsdf type="{kind}">{metallic}</bsdf>'
     scene = read(tmp_path, f'<shape type="cube">{bsdf}</shape>')
     assert ("1 principled material is metallic, which is drawn as matt" in scene.warnings) is is_said
+
+
+def test_why_no_triangle_is_left_is_said(tmp_path):
+    glass = '<shape type="cube"><bsdf type="dielectric"/></shape>'
+    with pytest.raises(
+        InputError, match=r"has no triangles \(1 material is glass or empty: its surfaces are"
+    ):
+        read(tmp_path, glass)
+
+
+@pytest.mark.parametrize(
+    "emitter",
+    [
+        '<emitter type="point"><rgb name="intensity" value="1e19"/></emitter>',
+        '<shape type="rectangle"><transform name="to_world"><scale value="1e6"/></transform>'
+        '<emitter type="area"><rgb name="radiance" value="1e8"/></emitter></shape>',
+    ],
+    ids=["point", "area"],
+)
+def test_a_light_that_no_scene_file_may_hold_is_refused(tmp_path, emitter):
+    """A .glb of it could not be read again."""
+    with pytest.raises(InputError, match=r"its intensity must be at most 1e\+18, got [16]e\+(19|20)"):
+        read(tmp_path, CUBE + emitter)
 
 
 def test_references_nested_too_deep_are_refused_in_bounded_time(tmp_path):

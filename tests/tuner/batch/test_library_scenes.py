@@ -1,11 +1,13 @@
 """Which files count as scenes of a library, and what the key of a scene depends on."""
 
 import os
+import struct
 import time
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from PIL import Image
 from reading_cost import BATCH, check_cost
 from scene_paths import OUTSIDE_SCENES
 
@@ -67,21 +69,86 @@ def test_a_list_that_is_none_is_refused(tmp_path, content, message):
         library_scenes(tmp_path / "list.txt", leave_out=tmp_path)
 
 
-@pytest.mark.parametrize("name", OUTSIDE_SCENES)
-def test_every_file_that_a_reader_opens_is_named(scenes_folder, monkeypatch, name):
-    """Otherwise a change to such a file would not trigger another fit."""
-    opened = []
+@pytest.fixture
+def opened(monkeypatch):
+    """Takes the resolved path of each file that a reader opens."""
+    paths = []
     read = SceneFolder._read
 
     def spy(self, path, subject):
-        opened.append(Path(path).resolve())
+        paths.append(Path(path).resolve())
         return read(self, path, subject)
 
     monkeypatch.setattr(SceneFolder, "_read", spy)
+    return paths
+
+
+@pytest.mark.parametrize("name", OUTSIDE_SCENES)
+def test_every_file_that_a_reader_opens_is_named(scenes_folder, opened, name):
+    """Otherwise a change to such a file would not trigger another fit."""
     scene = scenes_folder / name / OUTSIDE_SCENES[name]
     read_scene(scene)
     named = {path.resolve() for path in referred_files(scene)}
     assert set(opened) - {scene.resolve()} <= named
+
+
+OBJ = "v 0 0 0 1 1 1\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n"
+PLY = (
+    "ply\nformat ascii 1.0\ncomment TextureFile t.png\nelement vertex 3\n"
+    "property float x\nproperty float y\nproperty float z\nproperty float s\nproperty float t\n"
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    "0 0 0 0 0\n1 0 0 0 0\n0 1 0 0 0\n3 0 1 2\n"
+)
+MTL = "newmtl a\nmap_Kd t.png\n"
+
+
+@pytest.mark.parametrize(
+    ("scene", "texture", "files"),
+    [
+        ("a.obj", "tex#1.png", {"a.obj": f"mtllib a.mtl\n{OBJ}", "a.mtl": "newmtl a\nmap_Kd tex#1.png\n"}),
+        ("a.obj", "t.png", {"a.obj": f"mtllib my lib.mtl # mine\n{OBJ}", "my lib.mtl": MTL}),
+        (
+            "a.obj",
+            "t.png",
+            {"a.obj": f"mtllib \\\na.mtl\n{OBJ}", "a.mtl": "newmtl a\nmap_Kd \\\n t.png # x\n"},
+        ),
+        ("a.obj", "t.png", {"a.obj": f"\ufeffmtllib a.mtl\n{OBJ}", "a.mtl": "\ufeff" + MTL}),
+        (
+            "a.obj",
+            "t.png",
+            {"a.obj": f"mtllib a.mtl\n{OBJ}".replace("\n", "\r"), "a.mtl": MTL.replace("\n", "\r")},
+        ),
+        ("a.obj", "t.png", {"a.obj": f"\x0bmtllib\x0ca.mtl\n{OBJ}", "a.mtl": "newmtl a\n MAP_kd\x0bt.png\n"}),
+        ("a.ply", "t.png", {"a.ply": PLY}),
+        ("a.ply", "t.png", {"a.ply": PLY.replace("comment", "  comment")}),
+        ("a.ply", "t.png", {"a.ply": "\ufeff" + PLY.replace("\n", "\r")}),
+    ],
+    ids=["hash", "remark", "continued", "mark", "returns", "blanks", "ply", "ply blanks", "ply returns"],
+)
+def test_names_are_read_as_the_readers_do(tmp_path, opened, scene, texture, files):
+    for name, text in files.items():
+        (tmp_path / name).write_text(text, encoding="utf-8", newline="")
+    Image.new("RGB", (1, 1)).save(tmp_path / texture)
+    assert read_scene(tmp_path / scene).textures
+    assert {path.name for path in opened} == {*files, texture}
+    assert {tmp_path / name for name in (*files, texture)} - {tmp_path / scene} <= {
+        *referred_files(tmp_path / scene)
+    }
+
+
+def test_a_binary_file_named_gltf_is_looked_through(tmp_path):
+    """The reader goes by content too."""
+    text = b'{"images": [{"uri": "t.png"}]}  '
+    header = struct.pack("<4sIIII", b"glTF", 2, 20 + len(text), len(text), 0x4E4F534A)
+    (tmp_path / "a.gltf").write_bytes(header + text)
+    assert referred_files(tmp_path / "a.gltf") == (tmp_path / "t.png",)
+
+
+def test_names_in_xml_are_read_with_either_quote_and_entities(tmp_path):
+    (tmp_path / "a.xml").write_text(
+        """<scene><string value='a.obj'/><string value="b &amp; c.ply"/></scene>"""
+    )
+    assert referred_files(tmp_path / "a.xml") == (tmp_path / "a.obj", tmp_path / "b & c.ply")
 
 
 def digest(scene):

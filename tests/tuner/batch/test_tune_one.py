@@ -54,6 +54,14 @@ def test_a_damaged_record_is_none(make_job, fits, content):
     assert json.loads(path.read_text())["key"] == job.key
 
 
+def test_a_byte_order_mark_before_a_record_is_passed_over(make_job, fits):
+    job = make_job()
+    record = tune_one(job)
+    path = records_of(job).path(job.key)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert records_of(job).read(job.key) == record
+
+
 def test_a_scene_that_cannot_be_read_is_refused_with_its_reason(make_job, fits):
     job = make_job()
     fits.error = InputError(f"{job.scene}: no triangles\nat all")

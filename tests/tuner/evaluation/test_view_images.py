@@ -117,6 +117,13 @@ def test_what_is_broken_is_refused_by_name(tmp_path):
             read_view_images(path)
 
 
+def test_members_of_other_names_are_passed_over(tmp_path):
+    """Python refuses to read a number of so many digits."""
+    path = tmp_path / "images.npz"
+    np.savez_compressed(path, **{"9" * 5000 + "/level": np.zeros(1), "x/level": np.zeros(1)})
+    assert read_view_images(path) == ()
+
+
 def test_an_archive_that_unpacks_to_gigabytes_is_refused(tmp_path):
     path = tmp_path / "images.npz"
     np.savez_compressed(path, **{"0/valid": np.zeros((20_000, 60_000), bool)})

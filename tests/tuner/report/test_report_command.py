@@ -75,6 +75,13 @@ def test_values_that_are_no_numbers_are_dashes(fit_copy):
     assert "Loss at every step" not in page
 
 
+def test_a_byte_order_mark_before_the_figures_is_passed_over(fit_copy):
+    path = fit_copy / "metrics.json"
+    plain = read_fit_folder(fit_copy).document
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert read_fit_folder(fit_copy).document == plain
+
+
 def test_a_fit_without_images_has_a_page_all_the_same(fit_copy):
     (fit_copy / "images.npz").unlink()
     page = scene_page(read_fit_folder(fit_copy))

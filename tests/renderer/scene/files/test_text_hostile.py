@@ -45,6 +45,15 @@ def test_a_byte_order_mark_before_a_material_library_or_a_ply_file(tmp_path):
     assert read_bytes(tmp_path, MARK + PLY + body, "a.ply").triangle_count() == 1
 
 
+def test_a_ply_property_that_is_not_read_may_be_nan(tmp_path):
+    """Scans have it where they know no quality. In a property that is read, it is refused."""
+    header = PLY.decode().replace("float z\n", "float z\nproperty float quality\n")
+    body = "0 0 0 nan\n1 0 0 nan\n0 1 0 0\n3 0 1 2\n"
+    assert read_bytes(tmp_path, header + body, "a.ply").triangle_count() == 1
+    with pytest.raises(InputError, match="x, y, z must be finite"):
+        read_bytes(tmp_path, header + body.replace("0 0 0 nan", "nan 0 0 0"), "a.ply")
+
+
 def test_a_material_library_in_utf16_is_refused(tmp_path):
     (tmp_path / "a.mtl").write_bytes("newmtl a\nKd 0.5 0.5 0.5\n".encode("utf-16"))
     with pytest.raises(InputError, match=r"'a\.mtl': must be text in UTF-8"):
@@ -83,7 +92,7 @@ def test_a_see_through_material_is_said(tmp_path, line):
     assert scene.warnings == ("1 material is see-through (d, Tr); it is drawn opaque",)
 
 
-@pytest.mark.parametrize("lines", ["d 1.0", "Tr 0", "d 1\nTr 1", "Tr 1\nd 1", "d odd"])
+@pytest.mark.parametrize("lines", ["d 1.0", "Tr 0", "d 1\nTr 1", "Tr 1\nd 1", "d odd", "d nan", "Tr nan"])
 def test_an_opaque_material_is_not(tmp_path, lines):
     """Some programs write Tr 1 for opaque, beside d 1."""
     (tmp_path / "a.mtl").write_text(f"newmtl a\nKd .5 .5 .5\n{lines}\n")

@@ -10,6 +10,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vpltune.renderer.errors import MachineError
+from vpltune.renderer.files import unfinished_files
+from vpltune.renderer.files.atomic_file import written_whole
+from vpltune.renderer.files.unfinished_files import PREFIX
 from vpltune.renderer.scene.scene import scaled
 from vpltune.renderer.scene.views import scaled_view
 from vpltune.tuner.reference import ReferenceView, cache, noise_floor, reference_views
@@ -316,14 +320,29 @@ def test_leftovers_go_and_what_is_in_use_stays(monkeypatch, tmp_path):
     no_cache(monkeypatch, tmp_path)
     folder = tmp_path / "references"
     folder.mkdir()
-    for name in ("dead.lock", ".dead-x1.reference", ".busy-x1.reference", "kept.reference"):
+    for name in ("dead.lock", f"{PREFIX}x1.reference", "kept.reference"):
         (folder / name).touch()
-    with cache.locked("busy"):
+    with cache.locked("busy"), written_whole(folder / "new.reference") as busy:
         cache.remove_leftovers()
-        assert {path.name for path in folder.iterdir()} == {
-            "busy.lock",
-            ".busy-x1.reference",
-            "kept.reference",
-        }
+        assert {path.name for path in folder.iterdir()} == {"busy.lock", busy.name, "kept.reference"}
+        busy.write_text("whole")
+    (folder / "new.reference").unlink()
     cache.remove_leftovers()
     assert [path.name for path in folder.iterdir()] == ["kept.reference"]
+
+
+@pytest.mark.parametrize("reason", [13, 28, 30], ids=["permission", "full", "read-only"])
+def test_a_cache_that_cannot_be_written_to_stops_nothing(shapes, monkeypatch, tmp_path, caplog, reason):
+    """A read-only home and a full disk: the reference is rendered, and a warning says that it is not kept."""
+    no_cache(monkeypatch, tmp_path)
+
+    def refuse(**_):
+        raise OSError(reason, os.strerror(reason))
+
+    monkeypatch.setattr(unfinished_files.tempfile, "mkstemp", refuse)  # root may write anywhere
+    with pytest.raises(MachineError), written_whole(tmp_path / "x"):
+        pass
+    scene, view = shapes.box_room(), shapes.box_room_view()
+    assert reference_views(scene, (view,), noise_target=0.0, max_samples=16)[0].samples == 16
+    assert "reference not cached" in caplog.text
+    assert os.strerror(reason) in caplog.text

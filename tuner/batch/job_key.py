@@ -63,12 +63,9 @@ class SceneInputs:
             self._new = False
 
     def _hashed(self, scene: Path) -> list[list[Any]]:
-        # The name is that of `renderer.scene.placement`, which is not imported because that takes half a
-        # second.
-        sidecar = sidecar_path(scene)
         began = time.time_ns()
         entries = []
-        for path in (scene, sidecar, *referred_files(scene)):
+        for path in (scene, sidecar_path(scene), *referred_files(scene)):
             stamp = _stamp(path)
             entries.append([str(path), stamp, None if stamp is None else _file_digest(path)])
         latest = max((max(stamp[1:]) for _, stamp, _ in entries if stamp), default=0)

@@ -30,7 +30,7 @@ def render(output, *more):
 def decoded(path, size) -> np.ndarray:
     command = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-i", str(path)]
     command += ["-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
-    frames = subprocess.run(command, capture_output=True, check=True, timeout=60).stdout
+    frames = subprocess.run(command, capture_output=True, check=True).stdout
     return np.frombuffer(frames, np.uint8).reshape(-1, size[1], size[0], 3)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from vpltune.renderer.errors import InputError, MachineError
+from vpltune.renderer.export.scene_bundle import SceneBundle, write_bundle
 from vpltune.renderer.files import atomic_file, unfinished_files
 from vpltune.renderer.files.atomic_file import (
     require_writable,
@@ -96,6 +97,15 @@ def test_a_set_changes_whole(tmp_path, small_files):
         write_text_whole(folder / "c.txt", "new")
     assert (tmp_path / "b.txt").read_text() == "old"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.txt", "b.txt", "c.txt"]
+
+
+def test_a_bundle_changes_whole(tmp_path, small_files):
+    """The document says where things lie in the other file."""
+    write_bundle(tmp_path, SceneBundle({"is": "old"}, b"old"))
+    with pytest.raises(MachineError, match="bundle.json: cannot be written"):
+        write_bundle(tmp_path, SceneBundle({"is": "x" * 2 * LIMIT_BYTES}, b"new"))
+    assert (tmp_path / "bundle.bin").read_bytes() == b"old"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bundle.bin", "bundle.json"]
 
 
 def test_a_folder_is_tried_before_the_work(tmp_path, monkeypatch):

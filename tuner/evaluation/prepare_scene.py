@@ -175,6 +175,8 @@ def _views(
     scene: Scene, scene_path: Path, options: SceneOptions, validated: bool
 ) -> tuple[tuple[View, ...], tuple[str, ...]]:
     own = options.fixed_views
+    if own is not None and all(view.split != "fitted" for view in own):
+        raise InputError("--views: the file must have at least one view of the split 'fitted'")
     if own is not None and not validated:
         return tuple(view for view in own if view.split in ("fitted", "held_out")), ()
     if own is not None:
@@ -210,9 +212,7 @@ def _views(
 def _further_views(scene: Scene, own: tuple[View, ...], seed: int) -> tuple[View, ...]:
     """Views around the first fitted one of the user's own, of each split that these lack."""
     given = {view.split for view in own}
-    first = next((view for view in own if view.split == "fitted"), None)
-    if first is None:
-        raise InputError("--views: the file must have at least one view of the split 'fitted'")
+    first = next(view for view in own if view.split == "fitted")
     placed = views_for_scene(
         scene,
         first.camera,

@@ -28,6 +28,8 @@ _ASKS, _SPEAKS = b"?", b"!"
 """Words of the child: it wants to be asked to stop; it has printed its last line."""
 _SHOW_CURSOR = "\x1b[?25h"
 """Ends a progress display, which hides the cursor (ECMA-48, DECTCEM)."""
+_STDERR = 2
+"""The last of the descriptors that every process has open (POSIX)."""
 _DIE_WITH_PARENT = 1
 """PR_SET_PDEATHSIG of Linux's prctl."""
 
@@ -43,21 +45,24 @@ def guarded(command: Callable[[], int], name: str) -> int:
     """
     if not hasattr(os, "fork"):
         return command()
+    _open_standard_streams()
     signals, wake = os.pipe()
     os.set_blocking(wake, False)
+    signal.set_wakeup_fd(wake)
     # Signals are read from the pipe. Without a handler, Python would act on them itself. nohup ignores that
     # of the terminal, which stays so. A shell script ignores SIGINT for what it starts in the background;
     # whoever sends it to such a command all the same means it.
     heeded = [each for each in _ENDINGS if each in _MEANT or signal.getsignal(each) is not signal.SIG_IGN]
     for each in (*heeded, signal.SIGCHLD):
         signal.signal(each, _ignored)
-    signal.set_wakeup_fd(wake)
     words, speak = os.pipe()
+    guard = os.getpid()
     child = os.fork()
     if child == 0:
         signal.set_wakeup_fd(-1)
         for descriptor in (signals, wake, words):
             os.close(descriptor)
+        _die_with(guard)
         return _child(command, speak, heeded)
     os.close(speak)
     code = _Guard(child, name, signals, words).wait()
@@ -106,15 +111,24 @@ def _child(command: Callable[[], int], speak: int, heeded: list[int]) -> int:
     for number in (signal.SIGCHLD, *heeded):
         if number != signal.SIGINT:
             signal.signal(number, signal.SIG_DFL)
-    _die_with_the_guard()
     return command()
 
 
-def _die_with_the_guard() -> None:
+def _open_standard_streams() -> None:
+    """Put the null device in place of streams that were closed, or the next pipe would be taken for one."""
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= _STDERR:
+        os.set_inheritable(descriptor, True)
+    os.close(descriptor)
+
+
+def _die_with(guard: int) -> None:
+    """End this process when its guard is killed; elsewhere than on Linux it goes on to its end."""
     if sys.platform == "linux":
         import ctypes
 
         ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGKILL)
+        if os.getppid() != guard:  # it was killed before
+            os._exit(128 + signal.SIGKILL)
 
 
 class _Guard:
@@ -181,7 +195,8 @@ class _Guard:
                     return status
                 if self._received(left):
                     break  # asked twice
-        for process in (*_descendants(self._child), self._child):
+        # The command first, or it would say that one of the others has failed.
+        for process in (self._child, *_descendants(self._child)):
             with contextlib.suppress(ProcessLookupError):
                 os.kill(process, signal.SIGKILL)
         return os.waitpid(self._child, 0)[1]
@@ -207,11 +222,12 @@ class _Guard:
     def _remove_unfinished(self) -> None:
         for each in self._unfinished:
             path = Path(os.fsdecode(each))
-            if path.is_dir():
-                import shutil
+            with contextlib.suppress(OSError):
+                if path.is_dir():
+                    import shutil
 
-                shutil.rmtree(path, ignore_errors=True)
-            path.unlink(missing_ok=True)
+                    shutil.rmtree(path, ignore_errors=True)
+                path.unlink(missing_ok=True)
 
     def _say(self, line: str) -> None:
         if sys.stderr is None:

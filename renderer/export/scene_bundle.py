@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from vpltune.renderer.config.tuned_config import TunedConfig, config_text
-from vpltune.renderer.files.atomic_file import written_whole
+from vpltune.renderer.files.atomic_file import write_text_whole, written_together, written_whole
 from vpltune.renderer.frame import vpl_disc_bounds
 from vpltune.renderer.frame.disc_samples import NORMAL_REACH, OFF_PLANE_FACTOR, SAMPLE_REACH, sample_count
 from vpltune.renderer.frame.passes import vpl_importance
@@ -150,15 +150,17 @@ def left_out(config: TunedConfig, frame_size: tuple[int, int]) -> tuple[str, ...
 
 
 def write_bundle(folder: Path, bundle: SceneBundle) -> None:
-    """Write `bundle.json` and `bundle.bin` into `folder`, each whole or not at all, the document last.
+    """Write `bundle.json` and `bundle.bin` into `folder`, both or neither.
 
     Raises:
-        InputError: the folder cannot be written to.
+        InputError: the folder is a file.
+        MachineError: it cannot be written to.
     """
-    with written_whole(folder / BINARY_NAME) as temporary:
-        temporary.write_bytes(bundle.binary)
-    with written_whole(folder / DOCUMENT_NAME) as temporary:
-        temporary.write_text(json.dumps(bundle.document, indent=1, allow_nan=False) + "\n", encoding="ascii")
+    with written_together(folder) as staging:
+        with written_whole(staging / BINARY_NAME) as temporary:
+            temporary.write_bytes(bundle.binary)
+        text = json.dumps(bundle.document, indent=1, allow_nan=False) + "\n"
+        write_text_whole(staging / DOCUMENT_NAME, text)
 
 
 class _Binary:

@@ -3,8 +3,6 @@
 import contextlib
 import errno
 import os
-import shutil
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -45,7 +43,6 @@ def written_whole(path: Path) -> Iterator[Path]:
             raise
         raise MachineError(f"{path}: cannot be written ({error.strerror})") from error
     finally:
-        temporary.unlink(missing_ok=True)
         unfinished_files.ended(temporary)
 
 
@@ -63,28 +60,33 @@ def write_text_whole(path: Path, text: str) -> None:
 def written_together(folder: Path) -> Iterator[Path]:
     """Yield an empty folder in `folder`; on success, move all files in it to `folder`.
 
-    So a set of files changes whole: what can fail, fails before the first one is replaced.
+    So a set of files changes whole: what can fail, fails before the first one is replaced. Other files in
+    `folder` stay.
 
     Raises:
         InputError, MachineError: as `written_whole`.
     """
     require_writable(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    staging = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
-    unfinished_files.begun(staging)
+    staging = unfinished_files.new_folder(folder)
     try:
         yield staging
-        for path in sorted(staging.iterdir()):
-            path.replace(folder / path.name)
-    except MachineError as error:
-        raise MachineError(str(error).replace(str(staging), str(folder))) from error
+        ready = {path: folder / path.name for path in sorted(staging.iterdir())}
+        for named in ready.values():
+            if named.is_dir():
+                raise InputError(f"{named}: cannot be written (it is a folder)")
+        for path, named in ready.items():
+            path.replace(named)
+    except (InputError, MachineError) as error:
+        raise type(error)(str(error).replace(str(staging), str(folder))) from error
     finally:
-        shutil.rmtree(staging, ignore_errors=True)
         unfinished_files.ended(staging)
 
 
 def require_writable(folder: Path) -> None:
     """Check that files can be written in `folder`, or where it would be created. Call it before long work.
+
+    What killed processes left there is removed, which may be the room that is needed.
 
     Raises:
         InputError: the folder, or what it would be created in, is a file.
@@ -93,6 +95,7 @@ def require_writable(folder: Path) -> None:
     there = next(each for each in (folder, *folder.absolute().parents) if each.exists())
     if not there.is_dir():
         raise InputError(f"{there}: must be a folder, got a file")
+    unfinished_files.remove_abandoned(there)
     try:
         trial = _temporary(there / "trial")
     except MachineError as error:
@@ -104,7 +107,6 @@ def require_writable(folder: Path) -> None:
     except OSError as error:
         raise MachineError(f"{folder}: cannot be written to ({error.strerror})") from error
     finally:
-        trial.unlink(missing_ok=True)
         unfinished_files.ended(trial)
 
 
@@ -116,11 +118,8 @@ def _temporary(path: Path) -> Path:
     """A new, empty file beside `path`, in a folder that is created."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+        return unfinished_files.new_file(path.parent, path.suffix)
     except OSError as error:
         line = f"{path}: cannot be written ({error.strerror})"
         lacks = error.errno in (*_DISK, errno.EACCES, errno.EPERM)
         raise (MachineError if lacks else InputError)(line) from error
-    os.close(handle)
-    unfinished_files.begun(Path(name))
-    return Path(name)

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from vpltune.renderer.errors import InputError, MachineError
-from vpltune.renderer.files.atomic_file import written_whole
+from vpltune.renderer.files.atomic_file import written_together, written_whole
 from vpltune.renderer.files.image_file import write_png
 
 RATE_FACTOR = 10
@@ -40,8 +40,8 @@ def check_clip_path(path: Path, size: tuple[int, int]) -> None:
 def clip_writer(path: Path, size: tuple[int, int], fps: float) -> Iterator[Callable[[Image], None]]:
     """Yield a function that writes one frame per call.
 
-    An .mp4 is written atomically when the block ends without an exception. In a folder, each frame is written
-    atomically, frames stay after an interrupt, and existing frames with the same number are replaced.
+    A clip is written when the block ends without an exception; until then, an earlier one stays whole. In a
+    folder, its frames replace those of the earlier clip, even if that was longer, and other files stay.
 
     Args:
         path: an .mp4 or a folder.
@@ -58,13 +58,18 @@ def clip_writer(path: Path, size: tuple[int, int], fps: float) -> Iterator[Calla
             yield write
         return
     count = 0
+    with written_together(path) as folder:
 
-    def write_numbered(image: Image) -> None:
-        nonlocal count
-        write_png(path / f"frame_{count:05d}.png", image)
-        count += 1
+        def write_numbered(image: Image) -> None:
+            nonlocal count
+            write_png(folder / f"frame_{count:05d}.png", image)
+            count += 1
 
-    yield write_numbered
+        yield write_numbered
+    for earlier in path.glob("frame_*.png"):
+        number = earlier.stem.removeprefix("frame_")
+        if number.isdecimal() and int(number) >= count:
+            earlier.unlink()
 
 
 @contextlib.contextmanager
@@ -78,7 +83,9 @@ def _encoder(
         *("-c:v", "libx264", "-crf", str(RATE_FACTOR), "-pix_fmt", "yuv420p", "-movflags", "+faststart"),
         str(temporary),
     ]
-    encoder = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE)
+    # In a session of its own: Ctrl-C in the terminal would end it before the command, which would then say
+    # that the encoder failed.
+    encoder = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
     assert encoder.stdin is not None
     assert encoder.stderr is not None
     frames, said = encoder.stdin, encoder.stderr

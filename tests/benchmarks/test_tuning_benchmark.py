@@ -1,6 +1,7 @@
 """The searches of the tuning benchmark find what they should, and its rows say what was measured."""
 
 import contextlib
+import math
 import time
 
 import numpy as np
@@ -37,7 +38,9 @@ def bowl(point):
 def searched(name, evaluations):
     trace = Trace()
     with contextlib.suppress(SearchIsOver):
-        SEARCHES[name](CappedObjective(bowl, trace, lambda: 7, evaluations, seconds=60.0), np.full(3, 0.1))
+        SEARCHES[name](
+            CappedObjective(bowl, trace, lambda: 7, evaluations, seconds=math.inf), np.full(3, 0.1)
+        )
     return trace
 
 
@@ -68,7 +71,7 @@ def test_a_search_ends_at_its_cap_and_begins_at_the_start(name):
         return bowl(point)
 
     with contextlib.suppress(SearchIsOver):
-        SEARCHES[name](CappedObjective(loss, Trace(), lambda: 0, 12, seconds=60.0), np.full(3, 0.1))
+        SEARCHES[name](CappedObjective(loss, Trace(), lambda: 0, 12, seconds=math.inf), np.full(3, 0.1))
     assert len(seen) == 12
     assert all(((point >= 0.0) & (point <= 1.0)).all() for point in seen)
     if name != "cma_es":
@@ -79,7 +82,9 @@ def test_searches_one_after_the_other_share_a_trace_and_a_clock():
     trace, started = Trace(), time.perf_counter()
     for evaluations in (5, 3):
         with contextlib.suppress(SearchIsOver):
-            objective = CappedObjective(bowl, trace, lambda: 7, evaluations, seconds=60.0, started=started)
+            objective = CappedObjective(
+                bowl, trace, lambda: 7, evaluations, seconds=math.inf, started=started
+            )
             SEARCHES["random_search"](objective, np.full(3, 0.1))
     assert trace.evaluations == 8
     with pytest.raises(SearchIsOver):

@@ -203,7 +203,7 @@ def test_benchmarks_are_offered_in_a_checkout_only(tmp_path):
 
     def shown(*arguments):
         command = [sys.executable, "-m", "vpltune", *arguments]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
 
     assert not re.search(r"^\W*bench ", shown("--help").stdout, re.MULTILINE)
     assert program.CHECKOUT == REPOSITORY
@@ -224,7 +224,6 @@ def test_a_shell_is_told_what_may_follow(words, place, wanted):
         env={**os.environ, "_VPLTUNE_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": place},
         capture_output=True,
         text=True,
-        timeout=60,
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert set(done.stdout.split()) == wanted

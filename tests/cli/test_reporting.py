@@ -4,13 +4,14 @@ import io
 import json
 import math
 
+import pytest
 from rich.console import Console
 
 from vpltune.cli import progress_display
 from vpltune.cli.metrics_table import metrics_table, parameters_table
 from vpltune.cli.progress_display import shown_progress
 from vpltune.cli.report import print_json
-from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
 
 
 def text_of(table):
@@ -61,6 +62,31 @@ def test_the_parameters_table_has_values_defaults_and_units():
     assert "1.5" in text
     assert "VPL footprints" in text
     assert "k  intensity" in text
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "bias", "trades", "remark"),
+    [
+        (0.000333, 0.00253, 0.0005, ("intensity", "falloff_footprint", "visibility_bias"), "k, α, β"),
+        (0.938, 0.969, 0.0007213, ("intensity",), "k"),
+    ],
+    ids=["long interval", "long value"],
+)
+def test_the_parameters_table_fits_into_80_columns(low, high, bias, trades, remark):
+    """A line for each parameter and each remark, and nothing cut off."""
+    interval = {"low": low, "high": high, "determined": False, "trades_with": trades}
+    text = text_of(
+        parameters_table(
+            ArtistParameters(visibility_bias=bias).as_dict(), {"extinction_coefficient": interval}
+        )
+    )
+    lines = [line.rstrip() for line in text.splitlines()]
+    assert max(map(len, lines)) <= 80
+    assert len(lines) == 2 + len(ARTIST_PARAMETERS) + 2
+    assert "…" not in text
+    assert f"{low} to {high}" in text
+    assert f"trades with {remark}" in text
+    assert sum(line.endswith("of the distance") for line in lines) == 2
 
 
 def test_json_has_null_where_a_number_is_not_finite(capsys):

@@ -36,7 +36,6 @@ def python(*arguments: str) -> subprocess.CompletedProcess[str]:
         cwd=REPOSITORY,
         capture_output=True,
         text=True,
-        timeout=600,
         check=False,
     )
 

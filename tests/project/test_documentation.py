@@ -42,7 +42,6 @@ def test_the_site_builds_and_stands_alone(tmp_path):
         cwd=REPOSITORY,
         capture_output=True,
         text=True,
-        timeout=300,
         check=False,
     )
     assert done.returncode == 0, done.stderr

@@ -84,7 +84,6 @@ def test_the_browser_is_installed_only_where_it_is_asked_for(tmp_path, user, ask
         env={**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"},
         capture_output=True,
         text=True,
-        timeout=60,
         check=True,
     )
     log = tmp_path / "apt.log"
@@ -96,5 +95,5 @@ def test_the_browser_is_installed_only_where_it_is_asked_for(tmp_path, user, ask
 @pytest.mark.parametrize(("target", "wanted"), [("test", True), ("test-all", True), ("demo", False)])
 def test_only_tests_want_the_browser(target, wanted):
     command = ["make", "--dry-run", "--always-make", target]
-    done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=60, check=True)
+    done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=True)
     assert ("install_system_libraries.sh chromium" in done.stdout) == wanted

@@ -36,7 +36,6 @@ def wheel(tmp_path_factory) -> Path:
         [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)],
         cwd=REPOSITORY,
         check=True,
-        timeout=120,
         capture_output=True,
     )
     (built,) = folder.glob("*.whl")
@@ -69,11 +68,11 @@ class Installation:
         if sitecustomize:
             (packages / "sitecustomize.py").write_text(sitecustomize)
         pip = [sys.executable, "-m", "pip", "--python", python, "install", "-q", "--no-deps", "--no-index"]
-        subprocess.run([*pip, str(wheel)], check=True, timeout=120, capture_output=True, cwd=folder)
+        subprocess.run([*pip, str(wheel)], check=True, capture_output=True, cwd=folder)
         self.package = packages / "vpltune"
         self.scene = self.package / "configs" / "scenes" / "cornell-box.glb"
 
-    def run(self, *arguments: str, cwd: Path, seconds: float = 300.0) -> subprocess.CompletedProcess[str]:
+    def run(self, *arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
         """One command line of the installed program."""
         environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
         # What an incomplete installation finds out about the machine is not to be kept for others.
@@ -84,7 +83,6 @@ class Installation:
             env=environment,
             capture_output=True,
             text=True,
-            timeout=seconds,
         )
 
 

@@ -60,7 +60,6 @@ def check_cost(path: Path, how: tuple[str, str] = SCENE) -> str:
         capture_output=True,
         text=True,
         check=True,
-        timeout=300,
     )
     message, seconds, grown = json.loads(done.stdout)
     size = sum(file.stat().st_size for file in path.parent.glob(f"{path.stem}.*"))

@@ -152,8 +152,6 @@ def forget_failed(records: Records, jobs: Sequence[Job]) -> None:
 def _keep_listing(folder: Path, library: Path, found: Library) -> None:
     """Write which record belongs to which scene: the folder keeps records of older contents and options."""
     names = {job.name: job.key for job in found.jobs}
-    for leftover in folder.glob(".*.json"):
-        leftover.unlink()
     names |= {copy: names[name] for copy, name in found.copies.items()}
     write_text_whole(
         folder / "library.json", strict_json({"library": str(library.resolve()), "scenes": names}) + "\n"

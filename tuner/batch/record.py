@@ -2,7 +2,6 @@
 
 import json
 import os
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
@@ -60,12 +59,6 @@ class Records:
     def known_keys(self) -> set[str]:
         """Keys of all records, from the file names alone."""
         return {name.removesuffix(SUFFIX) for name in self._names() if not name.startswith(".")}
-
-    def unfinished_files(self) -> Iterator[tuple[str, Path]]:
-        """Key and path of each temporary file that a killed process left."""
-        for name in self._names():
-            if name.startswith("."):
-                yield name[1:].partition("-")[0], self._folder / name
 
     def read(self, key: str) -> Record | None:
         """The record of `key`, or None if it is missing or damaged."""

@@ -3,6 +3,7 @@
 import shutil
 from pathlib import Path
 
+from vpltune.renderer.files.unfinished_files import remove_abandoned
 from vpltune.tuner.batch.claim import claimed
 from vpltune.tuner.batch.job import claim_path, short_key
 from vpltune.tuner.batch.record import Records
@@ -11,10 +12,8 @@ from vpltune.tuner.batch.record import Records
 def sweep(folder: Path) -> None:
     """Delete temporary files, output folders without a record, and claims that no process holds."""
     records = Records(folder)
-    for key, path in records.unfinished_files():
-        with claimed(claim_path(folder, key)) as mine:
-            if mine:
-                path.unlink(missing_ok=True)
+    for written in (folder, folder / "records"):
+        remove_abandoned(written)
     outputs = _names(folder / "scenes")
     known = {short_key(key) for key in records.known_keys()} if outputs else set()
     for name in outputs:

@@ -12,7 +12,7 @@ import shutil
 import sys
 from collections.abc import Callable, Mapping
 
-from vpltune.renderer.errors import MachineError
+from vpltune.renderer.errors import InputError, MachineError
 from vpltune.tuner.doctor.extras import EXTRA_MODULES, how_to_install, missing_modules
 from vpltune.tuner.doctor.machine_findings import APT_LLVM, APT_OPENGL, PIP
 
@@ -135,7 +135,6 @@ def probe_mitsuba() -> Said:
 
 def probe_cache() -> Said:
     """The cache folder for references, which must be writable."""
-    from vpltune.renderer.errors import InputError
     from vpltune.renderer.files.atomic_file import written_whole
     from vpltune.renderer.files.cache_folder import cache_folder
 
@@ -144,7 +143,7 @@ def probe_cache() -> Said:
         with written_whole(folder / "doctor.txt") as temporary:
             temporary.write_text("can be written\n", encoding="utf-8")
         (folder / "doctor.txt").unlink()
-    except (InputError, OSError) as error:
+    except (InputError, MachineError, OSError) as error:
         return {
             "state": "fallback",
             "detail": str(error),

@@ -32,7 +32,8 @@ Pixels = UInt8[np.ndarray, "rows columns 3"]
 def write_comparison(path: Path, runtime: Runtime, views: tuple[tuple[str, EvaluatedView], ...]) -> None:
     """Write three rows of panels for each view: whole images, indirect light and signed error.
 
-    Pixels are repeated, never blended, until a panel has at least `PANEL_WIDTH` × `PANEL_HEIGHT` of them.
+    Where tuned draws what default does, one panel stands for both. Pixels are repeated, never blended, until
+    a panel has at least `PANEL_WIDTH` × `PANEL_HEIGHT` of them.
 
     Args:
         path: the .png to write.
@@ -81,15 +82,18 @@ def _rows(runtime: Runtime, evaluated: EvaluatedView, shown_for: str) -> list[Pi
     indirect = [_panel(runtime.display(light, light_exposure), "indirect light: reference", size)]
     blank = np.full((*view.valid.shape, 3), 255, np.uint8)
     errors = [_panel(blank, "signed error: blue too dark, red too bright", size)]
-    for name in VARIANTS:
+    captions = {name: name for name in VARIANTS}
+    if not evaluated.changed:
+        captions = {"tuned": "tuned = default", "ceiling": "ceiling"}
+    for name, caption in captions.items():
         image = evaluated.irradiance[name]
         shown = runtime.display(view.runtime_radiance(image), exposure)
-        whole.append(_panel(shown, captioned(name, evaluated.metrics[name]), size))
+        whole.append(_panel(shown, captioned(caption, evaluated.metrics[name]), size))
         shown = runtime.display(image * view.valid[..., None], light_exposure)
-        indirect.append(_panel(shown, f"indirect light: {name}", size))
+        indirect.append(_panel(shown, f"indirect light: {caption}", size))
         signed = signed_error(image, view.reference.irradiance, view.valid)
         colors = map_pixels(signed, -1.0, 1.0, DIVERGING, view.valid)
-        errors.append(_panel(colors, f"signed error: {name}", size))
+        errors.append(_panel(colors, f"signed error: {caption}", size))
     return [np.concatenate(panels, axis=1) for panels in (whole, indirect, errors)]
 
 

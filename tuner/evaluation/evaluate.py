@@ -49,6 +49,11 @@ class EvaluatedView:
     noise_floor: float
     """relMSE that the reference's noise alone adds."""
 
+    @property
+    def changed(self) -> bool:
+        """Whether tuned draws another image than default."""
+        return not np.array_equal(self.irradiance["default"], self.irradiance["tuned"])
+
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
@@ -85,7 +90,8 @@ class Evaluation:
     def most_and_least_gained(self) -> tuple[tuple[str, EvaluatedView], ...]:
         """The views in which tuned gains most and least over default, by trimmed relMSE, with a label each.
 
-        This is one view if both are the same, and the first view if indirect light reaches none.
+        This is one view if both are the same, and the first view if indirect light reaches none, or if tuned
+        draws what default does.
         """
         measured = [
             (each.metrics["tuned"].trimmed_relmse / each.metrics["default"].trimmed_relmse, index)
@@ -94,8 +100,11 @@ class Evaluation:
         ]
         if not measured:
             return (("no indirect light", self.views[0]),)
-        most, least = self.views[min(measured)[1]], self.views[max(measured)[1]]
-        return (("gained most", most),) + ((("gained least", least),) if least is not most else ())
+        if not any(each.changed for each in self.views):
+            return (("default kept", self.views[0]),)
+        labels = {min(measured)[1]: "gained most"}
+        labels.setdefault(max(measured)[1], "gained least" if max(measured)[0] <= 1.0 else "lost most")
+        return tuple((label, self.views[index]) for index, label in labels.items())
 
     def _split(self, split: str) -> dict[str, Any]:
         views = [evaluated for evaluated in self.views if evaluated.view.view.split == split]

@@ -1,5 +1,6 @@
 """Prepares a scene for `fit` and `evaluate`: views, their references, and the runtime's buffers."""
 
+import hashlib
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -92,6 +93,8 @@ class PreparedScene:
     """The validation views with their references; empty unless `prepare_scene` was asked for them."""
     notes: tuple[str, ...]
     """Remarks for the user: what was ignored in the file, and which camera and light were chosen."""
+    file_sha256: str
+    """Hex SHA-256 of the scene file when it was read; a fit takes minutes, in which it may change."""
 
 
 def prepare_scene(
@@ -124,6 +127,8 @@ def prepare_scene(
     with watch.stage("load"):
         progress("load", 0.0)
         scene = read_scene(scene_path)
+        with scene_path.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
         views, notes = _views(scene, scene_path, options, validated)
         # Before the references, so that a machine without OpenGL fails at once.
         runtime = Runtime(scene)
@@ -141,7 +146,7 @@ def prepare_scene(
             captured += capture_views(runtime, config, (view,), (reference,), statistics=validated)
             progress("capture", (index + 1) / len(drawn))
     validation = tuple(pair for pair in pairs if pair[0].split == "validation")
-    return PreparedScene(scene, runtime, tuple(captured), validation, (*scene.warnings, *notes))
+    return PreparedScene(scene, runtime, tuple(captured), validation, (*scene.warnings, *notes), digest)
 
 
 def references_of(
@@ -170,11 +175,14 @@ def _views(
     scene: Scene, scene_path: Path, options: SceneOptions, validated: bool
 ) -> tuple[tuple[View, ...], tuple[str, ...]]:
     own = options.fixed_views
+    if own is not None and all(view.split != "fitted" for view in own):
+        raise InputError("--views: the file must have at least one view of the split 'fitted'")
     if own is not None and not validated:
         return tuple(view for view in own if view.split in ("fitted", "held_out")), ()
     if own is not None:
         more = _further_views(scene, own, options.seed)
-        notes = [f"{view.name} is placed automatically: --views has no {view.split} views" for view in more]
+        lacking = dict.fromkeys(view.split.replace("_", "-") for view in more)
+        notes = [f"--views has no {split} views: they are placed automatically" for split in lacking]
         return (*own, *more), tuple(notes)
     cameras = (options.camera,)
     if options.camera_name is not None:
@@ -204,9 +212,7 @@ def _views(
 def _further_views(scene: Scene, own: tuple[View, ...], seed: int) -> tuple[View, ...]:
     """Views around the first fitted one of the user's own, of each split that these lack."""
     given = {view.split for view in own}
-    first = next((view for view in own if view.split == "fitted"), None)
-    if first is None:
-        raise InputError("--views: the file must have at least one view of the split 'fitted'")
+    first = next(view for view in own if view.split == "fitted")
     placed = views_for_scene(
         scene,
         first.camera,

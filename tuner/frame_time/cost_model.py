@@ -13,7 +13,7 @@ from pathlib import Path
 
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
-from vpltune.renderer.errors import InputError
+from vpltune.renderer.errors import InputError, MachineError
 from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.renderer.files.cache_folder import cache_folder
 from vpltune.renderer.frame.rsm_resolution import rsm_resolution
@@ -215,7 +215,7 @@ def _measure(runtime: Runtime, views: Sequence[View], config: TunedConfig) -> Co
 def _write(path: Path, model: CostModel) -> None:
     try:
         write_text_whole(path, json.dumps(asdict(model), indent=1) + "\n")
-    except InputError:
+    except (InputError, MachineError):
         return  # the cache cannot be written to: the model is measured again next time
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
-from vpltune.renderer.errors import InputError
+from vpltune.renderer.errors import InputError, MachineError
 from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.renderer.files.cache_folder import cache_folder
 from vpltune.tuner.fitting.fit_status import Descent, FitStatus
@@ -112,7 +112,7 @@ class _KeptFits:
         }
         try:
             write_text_whole(self._path, json.dumps(document) + "\n")
-        except InputError:
+        except (InputError, MachineError):
             return  # the cache cannot be written to: an interrupted front starts over
 
     def forget(self) -> None:

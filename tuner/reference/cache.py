@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from vpltune.renderer.errors import InputError
+from vpltune.renderer.errors import InputError, MachineError
 from vpltune.renderer.files.atomic_file import written_whole
 from vpltune.renderer.files.cache_folder import cache_folder
+from vpltune.renderer.files.unfinished_files import remove_abandoned
 from vpltune.tuner.reference.reference_view import ReferenceView
 
 SIZE_LIMIT = 2 * 2**30
@@ -65,8 +66,7 @@ def store(key: str, reference: ReferenceView) -> None:
     payload = buffer.getvalue()
     path = _path(key)
     try:
-        for leftover in path.parent.glob(f".{key}-*{_SUFFIX}"):  # from a process killed while writing
-            leftover.unlink(missing_ok=True)
+        remove_abandoned(path.parent)
         with written_whole(path) as temporary:
             temporary.write_bytes(_digest(key, payload) + payload)
         _log.debug("reference kept in %s", path)
@@ -74,7 +74,7 @@ def store(key: str, reference: ReferenceView) -> None:
         if _stored_bytes > LOOK_SHARE * SIZE_LIMIT:
             _stored_bytes = 0
             _drop_oldest()
-    except (OSError, InputError) as error:
+    except (OSError, InputError, MachineError) as error:
         _log.warning("reference not cached: %s", error)
 
 
@@ -102,12 +102,11 @@ def locked(key: str) -> Iterator[None]:
 def remove_leftovers() -> None:
     """Delete what killed processes left in the cache: locks nobody holds and half-written files."""
     folder = _path("").parent
-    for path in [*folder.glob("*.lock"), *folder.glob(f".*{_SUFFIX}")]:
-        key = path.stem.removeprefix(".").partition("-")[0]
-        handle = _lock(_path(key).with_suffix(".lock"), wait=False)
+    remove_abandoned(folder)
+    for path in folder.glob("*.lock"):
+        handle = _lock(path, wait=False)
         if handle is not None:
             path.unlink(missing_ok=True)
-            _path(key).with_suffix(".lock").unlink(missing_ok=True)
             os.close(handle)
 
 

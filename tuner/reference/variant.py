@@ -23,9 +23,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
-from vpltune.renderer.errors import InputError
+from vpltune.renderer.errors import InputError, MachineError
 from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.renderer.files.cache_folder import cache_folder
+from vpltune.renderer.files.unfinished_files import remove_abandoned
 from vpltune.tuner.reference.cache import locked
 
 _log = logging.getLogger(__name__)
@@ -114,9 +115,8 @@ def _chosen_variant(forced: str | None, named_library: str | None) -> MitsubaVar
         if kept is not None:
             return kept
         variant, certain = _probed_variant(libraries)
-        with contextlib.suppress(OSError, InputError):
-            for leftover in path.parent.glob(f".{path.stem}-*"):  # from a process killed while writing
-                leftover.unlink()
+        with contextlib.suppress(OSError, InputError, MachineError):
+            remove_abandoned(path.parent)
             if certain:
                 write_text_whole(path, json.dumps({"key": key, "variant": asdict(variant)}) + "\n")
     return variant

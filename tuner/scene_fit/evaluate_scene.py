@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.errors import InputError, MachineError
 from vpltune.renderer.files.cache_folder import cache_folder
 from vpltune.renderer.scene.views import write_views
 from vpltune.tuner.evaluation.error_breakdown import error_breakdown
@@ -21,7 +22,8 @@ class EvaluateOptions(SceneOptions):
     tuned: TunedConfig = field(default_factory=TunedConfig)
     """The config to measure."""
     views_path: Path | None = None
-    """The file that `fixed_views` were read from; None writes the views to the user's cache."""
+    """The file that `fixed_views` were read from; None writes the views to the user's cache, if it can be
+    written to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,23 +68,26 @@ def evaluate_scene(scene_path: Path, options: EvaluateOptions, progress: Progres
                 options,
                 lambda share: progress("split error", share),
             )
+    notes = (*prepared.notes, *evaluation.notes())
     views_path = options.views_path
     if views_path is None:
-        # The document names a views file, so there has to be one.
         views_path = cache_folder() / "views" / f"{scene_digest(prepared.scene)[:16]}-{options.seed}.json"
-        write_views(views_path, str(scene_path), tuple(view.view for view in prepared.views))
+        try:
+            write_views(views_path, str(scene_path), tuple(view.view for view in prepared.views))
+        except (InputError, MachineError) as error:
+            views_path, notes = None, (*notes, f"the views are not kept: {error}")
     document = {
         "scene": str(scene_path),
         "parameters": options.tuned.parameters.as_dict(),
         "visibility": options.tuned.visibility,
         "quality": options.tuned.quality.as_dict(),
-        "views": str(views_path),
+        "views": None if views_path is None else str(views_path),
         "metrics": evaluation.summary(),
         "seconds": {**watch.report(), "fit": 0.0},
         "status": "ok",
         **breakdown,
         "ceiling_parameters": evaluation.ceiling_parameters.as_dict(),
         "per_view": evaluation.per_view(),
-        "notes": [*prepared.notes, *evaluation.notes()],
+        "notes": list(notes),
     }
     return SceneEvaluation(evaluation, document)

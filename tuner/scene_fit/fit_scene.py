@@ -1,6 +1,5 @@
 """`vpltune fit`: fits a scene, judges the result on validation views, and writes config and metrics."""
 
-import hashlib
 import importlib.metadata
 import platform
 from dataclasses import asdict, dataclass, field, replace
@@ -152,7 +151,7 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
             breakdown["error_breakdown"] = error_breakdown(
                 prepared, evaluation, options, lambda share: progress("split error", share)
             )
-    config = _config(prepared, found, options, scene_path)
+    config = _config(prepared, found, options)
     views = (*(view.view for view in prepared.views), *(view for view, _ in prepared.validation))
     notes = (*prepared.notes, *evaluation.notes(), *found.notes)
     descent = found.descent
@@ -374,10 +373,10 @@ def _keeps_prior(found: _Found, options: FitOptions) -> bool:
     return kept and options.start.auto is not None and options.budget is None
 
 
-def _config(prepared: PreparedScene, found: _Found, options: FitOptions, scene_path: Path) -> TunedConfig:
+def _config(prepared: PreparedScene, found: _Found, options: FitOptions) -> TunedConfig:
     provenance: dict[str, str | int | float] = {
         "scene": prepared.scene.name,
-        "scene_file_sha256": hashlib.sha256(scene_path.read_bytes()).hexdigest(),
+        "scene_file_sha256": prepared.file_sha256,
         "scene_content_sha256": scene_digest(prepared.scene),
         "vpltune": importlib.metadata.version("vpltune"),
         "mitsuba": importlib.metadata.version("mitsuba"),

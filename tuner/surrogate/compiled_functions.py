@@ -1,6 +1,7 @@
 """Cache the functions that JAX compiles in the user's cache folder, so that the next fit starts faster."""
 
 import contextlib
+import warnings
 import zlib
 from pathlib import Path
 
@@ -17,6 +18,8 @@ def keep_compiled_functions() -> None:
     drop_torn_entries(cache_folder() / "compiled")
     jax.config.update("jax_compilation_cache_dir", str(cache_folder() / "compiled"))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", LEAST_SECONDS)
+    # In a folder that cannot be read or written, JAX compiles without it, and warns of each function.
+    warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache", UserWarning)
 
 
 def drop_torn_entries(folder: Path) -> None:

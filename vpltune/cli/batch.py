@@ -157,7 +157,8 @@ def _workers_that_fit(threads: int) -> int:
     """The number of scenes that this machine has cores and memory to fit in parallel."""
     from vpltune.tuner.batch.supervised_process import machine_memory_bytes
 
-    cores = len(os.sched_getaffinity(0))
+    # Only Linux says which cores a process may use.
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(1, min(cores // threads, machine_memory_bytes() // SCENE_MEMORY_BYTES))
 
 

@@ -67,7 +67,7 @@ def evaluate(
     shown = (
         metrics_table(document["metrics"]),
         *error_breakdown_table(document),
-        f"views: {escape(document['views'])}",
+        *(() if document["views"] is None else (f"views: {escape(document['views'])}",)),
     )
     return Report(document, shown)
 

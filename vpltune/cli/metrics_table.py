@@ -48,28 +48,28 @@ def metrics_table(metrics: Mapping[str, Any]) -> Any:
 def parameters_table(
     parameters: Mapping[str, float | int], uncertainty: Mapping[str, Mapping[str, Any]]
 ) -> Any:
-    """A rich table of the parameters with intervals, defaults and units.
+    """A rich table of the parameters with intervals, defaults and units. It fits into 80 columns.
 
     The arguments are the keys `parameters` and `uncertainty` of metrics.json.
     """
     from rich.table import Table
 
-    table = Table(title="Parameters", title_justify="left")
-    table.add_column("", no_wrap=True)
-    columns: tuple[tuple[str, JustifyMethod, bool], ...] = (
-        ("value", "right", True),
-        ("90 % interval", "right", True),
-        ("trades\nwith", "left", False),
-        ("default", "right", True),
-        ("unit", "left", False),
+    # Lines between the columns would take the room of the units.
+    table = Table(title="Parameters", title_justify="left", box=None, pad_edge=False)
+    columns: tuple[tuple[str, JustifyMethod], ...] = (
+        ("", "left"),
+        ("value", "right"),
+        ("90 % interval", "left"),
+        ("default", "right"),
+        ("unit", "left"),
     )
-    for heading, justify, no_wrap in columns:
-        table.add_column(heading, justify=justify, no_wrap=no_wrap)
+    for heading, justify in columns:
+        table.add_column(heading, justify=justify, no_wrap=heading != "unit")
     for spec in ARTIST_PARAMETERS:
         table.add_row(
             f"{spec.symbol}  {spec.name}",
             f"{parameters[spec.name]:.4g}",
-            *_sureness(uncertainty.get(spec.name)),
+            _sureness(uncertainty.get(spec.name)),
             f"{spec.default:.4g}",
             spec.unit,
             style="bold" if spec.fitted else "dim",
@@ -77,14 +77,16 @@ def parameters_table(
     return table
 
 
-def _sureness(interval: Mapping[str, Any] | None) -> tuple[str, str]:
+def _sureness(interval: Mapping[str, Any] | None) -> str:
     if interval is None:
-        return "", ""
+        return ""
     symbols = {spec.name: spec.symbol for spec in ARTIST_PARAMETERS}
-    ends = f"{interval['low']:.3g} to {interval['high']:.3g}"
+    lines = [f"{interval['low']:.3g} to {interval['high']:.3g}"]
     if not interval["determined"]:
-        ends += "\nnot determined"
-    return ends, ", ".join(symbols[name] for name in interval["trades_with"])
+        lines.append("not determined")
+    if interval["trades_with"]:
+        lines.append(f"trades with {', '.join(symbols[name] for name in interval['trades_with'])}")
+    return "\n".join(lines)
 
 
 def error_breakdown_table(document: Mapping[str, Any]) -> tuple[Any, ...]:

@@ -50,8 +50,7 @@ class ClusteredDiscsPass(FramePass):
 
     def _compiled(self) -> tuple[ComputeProgram, ComputeProgram, ComputeProgram]:
         """Compiled when they are first needed: points need none."""
-        resources = self._resources
-        defines = DEFINES
+        resources, defines = self._resources, DEFINES
         words = self._vpl_count * -(-sample_count(self._vpl_count) // 32)
         resources["vpl_members"] = resources.context.buffer(bytes(4 * words))
         self._programs = (

@@ -32,7 +32,7 @@ WITHOUT_US = (
 
 def read_image(folder, output):
     command = [sys.executable, "-c", WITHOUT_US, str(READER), str(folder), str(output)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=folder, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
     assert done.returncode == 0, done.stderr
     return np.asarray(Image.open(output)), done.stderr
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from vpltune.renderer.errors import InputError, MachineError
-from vpltune.renderer.files import atomic_file
+from vpltune.renderer.export.scene_bundle import SceneBundle, write_bundle
+from vpltune.renderer.files import atomic_file, unfinished_files
 from vpltune.renderer.files.atomic_file import (
     require_writable,
     write_text_whole,
@@ -89,6 +90,22 @@ def test_a_set_changes_whole(tmp_path, small_files):
     with written_together(tmp_path) as folder:
         write_text_whole(folder / "a.txt", "new")
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.txt": "new", "b.txt": "old"}
+    (tmp_path / "c.txt").mkdir()
+    refusal = f"{tmp_path / 'c.txt'}: cannot be written .it is a folder."
+    with pytest.raises(InputError, match=refusal), written_together(tmp_path) as folder:
+        write_text_whole(folder / "b.txt", "new")
+        write_text_whole(folder / "c.txt", "new")
+    assert (tmp_path / "b.txt").read_text() == "old"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.txt", "b.txt", "c.txt"]
+
+
+def test_a_bundle_changes_whole(tmp_path, small_files):
+    """The document says where things lie in the other file."""
+    write_bundle(tmp_path, SceneBundle({"is": "old"}, b"old"))
+    with pytest.raises(MachineError, match="bundle.json: cannot be written"):
+        write_bundle(tmp_path, SceneBundle({"is": "x" * 2 * LIMIT_BYTES}, b"new"))
+    assert (tmp_path / "bundle.bin").read_bytes() == b"old"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bundle.bin", "bundle.json"]
 
 
 def test_a_folder_is_tried_before_the_work(tmp_path, monkeypatch):
@@ -102,7 +119,7 @@ def test_a_folder_is_tried_before_the_work(tmp_path, monkeypatch):
     def refuse(**_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(atomic_file.tempfile, "mkstemp", refuse)  # root may write anywhere
+    monkeypatch.setattr(unfinished_files.tempfile, "mkstemp", refuse)  # root may write anywhere
     with pytest.raises(MachineError, match="Permission denied"):
         require_writable(tmp_path)
 

@@ -11,6 +11,7 @@ import pytest
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, config_text
 from vpltune.renderer.errors import InputError
+from vpltune.renderer.files.unfinished_files import PREFIX
 from vpltune.tuner.batch.batch import run_batch
 from vpltune.tuner.batch.batch_log import BatchLog
 from vpltune.tuner.batch.job import JobOptions
@@ -118,13 +119,14 @@ def test_failed_scenes_are_left_alone_until_asked_for(library, fits):
 def test_what_killed_processes_left_is_swept_and_records_are_not(library, fits):
     out = library.parent / "out"
     first, _ = run(library)
+    (out / ".mine.json").write_text("{}")
     kept = sorted(path for path in out.rglob("*") if path.is_file())
     key = "0" * 64
     leftovers = [
-        out / "records" / f".{key}-ab12.json",
-        out / f"scenes/gone-{key[:12]}" / ".tuned-x.json",
+        out / "records" / f"{PREFIX}ab12.json",
+        out / f"scenes/gone-{key[:12]}" / "tuned.json",
         out / "claims" / key[:12],
-        out / ".library-x.json",
+        out / f"{PREFIX}x.json",
     ]
     for path in leftovers:
         path.parent.mkdir(exist_ok=True)

@@ -104,10 +104,8 @@ def cluster(tmp_path):
     cluster.start_worker(1)
     yield cluster
     cluster.stop()
-    deadline = time.monotonic() + 10.0
-    while tuning_processes(tmp_path) and time.monotonic() < deadline:
+    while tuning_processes(tmp_path):  # for ever, where one outlives its worker
         time.sleep(0.1)
-    assert tuning_processes(tmp_path) == []
 
 
 def tuning_processes(folder):
@@ -159,7 +157,7 @@ def test_dask_survives_kills_and_ends_with_the_same_bits(library, cluster, tmp_p
                     for index in range(2):
                         kill(cluster.workers[index])
                         cluster.start_worker(index)
-            assert batch.wait(300) == 4
+            assert batch.wait() == 4
         finally:
             batch.kill()
             batch.wait()
@@ -185,14 +183,14 @@ def test_submitit_survives_the_end_of_all_its_tasks(library, tmp_path, monkeypat
     out = tmp_path / "out"
     command = arguments(library, out, "--slurm", "cluster=local", "--workers", "2")
     batch = subprocess.Popen([sys.executable, "-m", "vpltune", *command], cwd=REPOSITORY)
-    deadline = time.monotonic() + 120.0
-    while len(Records(out).known_keys()) < 2 and time.monotonic() < deadline:
+    while len(Records(out).known_keys()) < 2:
+        assert batch.poll() is None
         time.sleep(0.1)
     tasks = {process.parent().pid for process in tuning_processes(tmp_path)}
     assert tasks
     for task in tasks:
         os.kill(task, signal.SIGKILL)
-    assert batch.wait(300) == 4
+    assert batch.wait() == 4
     assert len(configs(out)) == SCENES - 1
     assert len(list((out / "slurm").glob("*_submitted.pkl"))) > 2
     assert run(command) == 4

@@ -1,6 +1,7 @@
 """A tuning process that exceeds a limit or dies is replaced, and its scene is recorded as failed."""
 
 import json
+import math
 import os
 import re
 import signal
@@ -51,7 +52,7 @@ while True:
         send(connection, {"busy": True})
 """
 
-PLENTY = Limits(60.0, 4 << 30, 0)  # a choice: never exceeded here, and no retries
+PLENTY = Limits(math.inf, 4 << 30, 0)  # a choice: never exceeded here, and no retries
 
 
 @pytest.fixture
@@ -67,7 +68,7 @@ def supervised(tmp_path, monkeypatch):
     ("does", "limits", "reason"),
     [
         ("sleep", Limits(0.5, 4 << 30, 0), "it took longer than the limit of 0.5 s"),
-        ("grow", Limits(60.0, 100 << 20, 0), "more than the limit of 100 MiB"),
+        ("grow", Limits(math.inf, 100 << 20, 0), "more than the limit of 100 MiB"),
         ("die", PLENTY, r"its process was killed by SIGABRT \(out of luck\)"),
         ("leave", PLENTY, "its process ended with exit code 7"),
     ],
@@ -85,7 +86,7 @@ def test_a_scene_that_misbehaves_is_set_aside_and_the_next_is_served(
 
 def test_every_retry_is_made_and_the_last_reason_kept(supervised, make_job):
     events = []
-    record = tune_with_retries(supervised, make_job("leave"), Limits(60.0, 4 << 30, 3), events.append)
+    record = tune_with_retries(supervised, make_job("leave"), Limits(math.inf, 4 << 30, 3), events.append)
     assert record.attempts == 4
     assert [e["attempt"] for e in events if e["event"] == "attempt_failed"] == [1, 2, 3, 4]
 
@@ -98,7 +99,7 @@ def test_a_limit_passed_twice_is_not_tried_again(supervised, make_job):
 def test_a_second_attempt_may_succeed(supervised, make_job):
     events = []
     job = make_job("second time")
-    assert tune_with_retries(supervised, job, Limits(60.0, 4 << 30, 3), events.append) is None
+    assert tune_with_retries(supervised, job, Limits(math.inf, 4 << 30, 3), events.append) is None
     assert [e["reason"] for e in events if e["event"] == "attempt_failed"] == ["ValueError: once"]
 
 
@@ -119,7 +120,7 @@ def test_a_process_that_has_grown_large_is_replaced_before_the_next_scene(superv
     first = supervised._process.pid
     supervised.attempt(make_job("next"), 1, PLENTY, lambda stage, share: None)
     assert supervised._process.pid == first
-    tight = Limits(60.0, int(1.5 * memory_of(psutil.Process(first))), 0)
+    tight = Limits(math.inf, int(1.5 * memory_of(psutil.Process(first))), 0)
     supervised.attempt(make_job("next"), 1, tight, lambda stage, share: None)
     assert supervised._process.pid != first
     assert not psutil.pid_exists(first)
@@ -133,7 +134,7 @@ from vpltune.tuner.batch.supervised_process import Limits, SupervisedProcess
 process = SupervisedProcess(1, threading.Event(), module="stand_in")
 def progress(stage, share):
     print(process._process.pid, flush=True)
-process.attempt(Job.from_json(Path(sys.argv[1]).read_text()), 1, Limits(600.0, 4 << 30), progress)
+process.attempt(Job.from_json(Path(sys.argv[1]).read_text()), 1, Limits(float('inf'), 4 << 30), progress)
 """
 
 
@@ -144,16 +145,14 @@ def test_the_process_dies_with_its_parent(supervised, make_job, tmp_path):
         child = int(parent.stdout.readline())
         assert psutil.pid_exists(child)
         parent.send_signal(signal.SIGKILL)
-    deadline = time.monotonic() + 10.0
-    while psutil.pid_exists(child) and time.monotonic() < deadline:
+    while psutil.pid_exists(child):  # for ever, where it outlives its parent
         time.sleep(0.05)
-    assert not psutil.pid_exists(child)
 
 
 def test_refused_scenes_get_a_record_each_from_real_processes(make_job):
     """Two real tuning processes get files that are not scenes: no retries, and no claims left."""
     jobs = [make_job(f"room{index}.glb") for index in range(5)]
-    events = list(tune_locally(jobs, 2, 1, Limits(120.0, 8 << 30)))
+    events = list(tune_locally(jobs, 2, 1, Limits(math.inf, 8 << 30)))
     records = [event for event in events if event["event"] == "record"]
     assert {record["status"] for record in records} == {"refused"}
     assert {record["attempts"] for record in records} == {1}

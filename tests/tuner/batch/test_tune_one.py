@@ -39,7 +39,7 @@ def test_a_claimed_scene_is_left_to_its_holder(make_job, fits):
 def test_what_a_killed_process_left_is_made_anew(make_job, fits):
     job = make_job()
     job.output.mkdir(parents=True)
-    (job.output / ".tuned-x1.json").write_text("{")
+    (job.output / "half.json").write_text("{")
     tune_one(job)
     assert [path.name for path in job.output.iterdir()] == ["tuned.json"]
 

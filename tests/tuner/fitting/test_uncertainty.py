@@ -129,8 +129,8 @@ def test_the_table_tells_what_is_open():
     lines = shown.get().splitlines()
     (row,) = (row for row, line in enumerate(lines) if "falloff_footprint" in line)
     assert "0.05 to 20" in lines[row]
-    assert "│ k" in lines[row]
     assert "not determined" in lines[row + 1]
+    assert "trades with k" in lines[row + 2]
 
 
 def test_planted_problems_are_seeded():

@@ -40,7 +40,7 @@ def steady(monkeypatch, tmp_path):
 def prepared(gl_context) -> PreparedScene:
     runtime = Runtime(colored_room(), context=gl_context)
     coarse = replace(START, quality=Quality(rsm_resolution=128))
-    return PreparedScene(colored_room(), runtime, (converged_view(runtime, "spot", coarse),), (), ())
+    return PreparedScene(colored_room(), runtime, (converged_view(runtime, "spot", coarse),), (), (), "")
 
 
 @pytest.mark.parametrize("budget", [12.0, pytest.param(30.0, marks=pytest.mark.slow)])

@@ -10,6 +10,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vpltune.renderer.errors import MachineError
+from vpltune.renderer.files import unfinished_files
+from vpltune.renderer.files.atomic_file import written_whole
+from vpltune.renderer.files.unfinished_files import PREFIX
 from vpltune.renderer.scene.scene import scaled
 from vpltune.renderer.scene.views import scaled_view
 from vpltune.tuner.reference import ReferenceView, cache, noise_floor, reference_views
@@ -227,7 +231,6 @@ def test_scalar_fallback_agrees_within_noise(shapes, tmp_path):
         [sys.executable, "-W", "error", "-c", program, str(tmp_path / "job"), str(tmp_path / "made.npz")],
         env=os.environ | {"VPLTUNE_MITSUBA_VARIANT": "scalar_rgb"},
         check=True,
-        timeout=100,
     )
     with np.load(tmp_path / "made.npz") as made:
         np.testing.assert_allclose(made["direct"], base.direct_irradiance, atol=1e-4)
@@ -257,7 +260,7 @@ def test_processes_make_a_reference_once(shapes, tmp_path, count):
         )
         for _ in range(count)
     ]
-    said = "".join(process.communicate(timeout=100)[0] for process in running)
+    said = "".join(process.communicate()[0] for process in running)
     assert [process.returncode for process in running] == [0] * count
     assert said.count("rendered") == 1
     assert [path.suffix for path in (tmp_path / "cache" / "references").iterdir()] == [".reference"]
@@ -279,7 +282,6 @@ def test_a_killed_renderer_hands_over_and_leaves_nothing(shapes, tmp_path):
         done = subprocess.run(
             [sys.executable, "-c", program, str(tmp_path / "job"), fate],
             env=os.environ | {"VPLTUNE_CACHE": str(tmp_path / "cache")},
-            timeout=100,
         )
         assert done.returncode == code
         assert sorted(path.suffix for path in folder.iterdir()) == left
@@ -316,14 +318,29 @@ def test_leftovers_go_and_what_is_in_use_stays(monkeypatch, tmp_path):
     no_cache(monkeypatch, tmp_path)
     folder = tmp_path / "references"
     folder.mkdir()
-    for name in ("dead.lock", ".dead-x1.reference", ".busy-x1.reference", "kept.reference"):
+    for name in ("dead.lock", f"{PREFIX}x1.reference", "kept.reference"):
         (folder / name).touch()
-    with cache.locked("busy"):
+    with cache.locked("busy"), written_whole(folder / "new.reference") as busy:
         cache.remove_leftovers()
-        assert {path.name for path in folder.iterdir()} == {
-            "busy.lock",
-            ".busy-x1.reference",
-            "kept.reference",
-        }
+        assert {path.name for path in folder.iterdir()} == {"busy.lock", busy.name, "kept.reference"}
+        busy.write_text("whole")
+    (folder / "new.reference").unlink()
     cache.remove_leftovers()
     assert [path.name for path in folder.iterdir()] == ["kept.reference"]
+
+
+@pytest.mark.parametrize("reason", [13, 28, 30], ids=["permission", "full", "read-only"])
+def test_a_cache_that_cannot_be_written_to_stops_nothing(shapes, monkeypatch, tmp_path, caplog, reason):
+    """A read-only home and a full disk: the reference is rendered, and a warning says that it is not kept."""
+    no_cache(monkeypatch, tmp_path)
+
+    def refuse(**_):
+        raise OSError(reason, os.strerror(reason))
+
+    monkeypatch.setattr(unfinished_files.tempfile, "mkstemp", refuse)  # root may write anywhere
+    with pytest.raises(MachineError), written_whole(tmp_path / "x"):
+        pass
+    scene, view = shapes.box_room(), shapes.box_room_view()
+    assert reference_views(scene, (view,), noise_target=0.0, max_samples=16)[0].samples == 16
+    assert "reference not cached" in caplog.text
+    assert os.strerror(reason) in caplog.text

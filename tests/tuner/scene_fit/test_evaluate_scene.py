@@ -1,5 +1,6 @@
 """An evaluation measures what the config draws: its quality counts as its parameters do."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.errors import InputError
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.views import View
@@ -60,3 +62,20 @@ def test_what_sharing_vpls_among_pixels_costs_is_the_filters_share(evaluated):
     """Beside the surrogate's full gather: next to nothing without, and more with blocks of 4²."""
     fine, coarse = (evaluated[name].document["error_breakdown"]["filter"] for name in ("fine", "coarse"))
     assert abs(coarse) > 10.0 * abs(fine)
+
+
+def test_a_cache_that_cannot_be_written_to_keeps_no_views(view, tmp_path, monkeypatch):
+    """The work is done, and a home may be read-only."""
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setenv("VPLTUNE_CACHE", str(tmp_path / "file"))
+    options = EvaluateOptions(tuned=FINE, fixed_views=(view,))
+    document = evaluate_scene(SCENE, options, lambda stage, share: None).document
+    assert document["views"] is None
+    assert document["notes"][-1].startswith(f"the views are not kept: {tmp_path / 'file' / 'views'}")
+
+
+@pytest.mark.parametrize("split", ["held_out", "validation"])
+def test_views_of_ones_own_need_a_fitted_one(view, split):
+    options = EvaluateOptions(tuned=FINE, fixed_views=(replace(view, split=split),))
+    with pytest.raises(InputError, match="--views: the file must have at least one view of the split"):
+        evaluate_scene(SCENE, options, lambda stage, share: None)

@@ -121,7 +121,6 @@ def outcomes(corpora_folder, verdicts) -> dict[str, dict]:
         cwd=REPOSITORY,
         capture_output=True,
         text=True,
-        timeout=300,
         check=False,
     )
     assert result.returncode == 0, result.stderr

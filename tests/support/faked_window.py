@@ -133,6 +133,8 @@ class FakedWindow:
     surface: dict[str, Any] | None = None
     """What every `pick` is answered with; None leaves it unanswered."""
     socket: Any = None
+    rested: int = 0
+    """Looks that had been sent when the page was last waited for to be at rest."""
 
     def connected(self, socket: Any) -> None:
         """Greet a page that has opened its socket, and record what it says."""
@@ -185,8 +187,17 @@ class FakedWindow:
         raise AssertionError(f"never: {what}; received {self.received[-5:]}")
 
     def wait_for_rest(self) -> None:
-        """Wait for the look that says that the user has stopped."""
-        self.wait_for(lambda: self.sent("look") and not self.sent("look")[-1]["moving"], "a look at rest")
+        """Wait for a look, sent since the last call, that says that the user has stopped."""
+        self.wait_for(
+            lambda: len(self.sent("look")) > self.rested and not self.sent("look")[-1]["moving"],
+            "a look at rest",
+        )
+        self.rested = len(self.sent("look"))
+
+    def forget(self) -> None:
+        """Begin the record of messages anew."""
+        self.received.clear()
+        self.rested = 0
 
     def colour_at(self, x: float, y: float) -> list[int]:
         """The canvas's colour at a place in [0, 1]²: red, green, blue."""

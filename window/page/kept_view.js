@@ -22,7 +22,8 @@ export function keptView(model) {
   });
   addEventListener("pagehide", () => key !== null && write());
   return {
-    /** Takes up what was looked at in the scene that has just arrived, or its start. @returns {boolean} whether
+    /** Takes up what was looked at in the scene that has just arrived, or its start.
+     * @returns {boolean} whether
      * it is another scene than before */
     begin() {
       const { scene, viewing } = model;

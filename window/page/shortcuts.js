@@ -1,7 +1,8 @@
 /**
  * The keys, and the overlay that lists them.
  *
- * @typedef {{keys: string, does: string, group: string, run?: (event: KeyboardEvent) => void, match?: (event: KeyboardEvent) => boolean}} Shortcut
+ * @typedef {{keys: string, does: string, group: string, run?: (event: KeyboardEvent) => void,
+ *   match?: (event: KeyboardEvent) => boolean}} Shortcut
  */
 import { byId, element, takesText } from "./controls/elements.js";
 

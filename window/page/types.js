@@ -14,8 +14,9 @@
  * @typedef {number | string | null} QualityValue
  * @typedef {{name: string, meaning: string, choices?: QualityValue[], low?: number, high?: number}} Quality
  * @typedef {{config: string, sidecar: string, views: string}} Paths
- * @typedef {{name: string, path: string | null, bounds: [Vector, Vector], seconds: number, parameters: Parameter[],
- *   qualities: Quality[], layers: string[], renderer: string, camera: Camera, tuning: string | null,
+ * @typedef {{name: string, path: string | null, bounds: [Vector, Vector], seconds: number,
+ *   parameters: Parameter[], qualities: Quality[], layers: string[], renderer: string,
+ *   camera: Camera, tuning: string | null,
  *   paths: Paths}} Scene
  * @typedef {{parameters: Record<string, number>, quality: Record<string, QualityValue>,
  *   intervals: Record<string, [number, number]>, status: string, sentence: string}} Config
@@ -23,8 +24,8 @@
  * @typedef {{running: boolean, stage: string, share: number, seconds_left: number | null, losses: number[],
  *   parameters: Record<string, number> | null, status: string, sentence: string}} Fit
  * @typedef {{configs: Record<ConfigSource, Config | null>, lights: Light[], views: KeptView[],
- *   unsaved: boolean, unsaved_lights: boolean, can_undo: boolean, can_redo: boolean, undo_name: string | null,
- *   redo_name: string | null, budget_ms: number | null, fit: Fit}} State
+ *   unsaved: boolean, unsaved_lights: boolean, can_undo: boolean, can_redo: boolean,
+ *   undo_name: string | null, redo_name: string | null, budget_ms: number | null, fit: Fit}} State
  * @typedef {{id: number, position: Vector | null, normal: Vector, distance: number}} Picked
  * @typedef {{source: Source, passes: [string, number][], milliseconds: number}} Timings
  * @typedef {{pane: Pane, source: Source, look: number, size: [number, number], settled: boolean,

@@ -12,8 +12,8 @@ export function byId(id, kind) {
 
 /** A new element with attributes (`class`, `data-…`, `aria-…`; false leaves one out) and children.
  * @template {keyof HTMLElementTagNameMap} K
- * @param {K} tag @param {Record<string, string | number | boolean>} [attributes] @param {(Node | string)[]} children
- * @returns {HTMLElementTagNameMap[K]} */
+ * @param {K} tag @param {Record<string, string | number | boolean>} [attributes]
+ * @param {(Node | string)[]} children @returns {HTMLElementTagNameMap[K]} */
 export function element(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {

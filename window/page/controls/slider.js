@@ -7,7 +7,7 @@
 import { element, setAttribute } from "./elements.js";
 import { placeOf, stepped, valueAt } from "../maths/scales.js";
 
-/** Milliseconds within which a second press belongs to the same gesture: a double-click is one step of undo. */
+/** Milliseconds within which a press belongs to the gesture before: a double-click is one undo step. */
 const SAME_GESTURE = 500;
 /** Arrow keys that a press of Page Up or Page Down stands for. */
 const PAGE = 10;
@@ -57,7 +57,8 @@ export class Slider {
     setAttribute(this.input, "aria-valuetext", text);
   }
 
-  /** Moves a mark; null hides it. @param {"default" | "tuned" | "ghost"} mark @param {number | null | undefined} value */
+  /** Moves a mark; null hides it.
+   * @param {"default" | "tuned" | "ghost"} mark @param {number | null | undefined} value */
   mark(mark, value) {
     this.marks[mark].hidden = value === null || value === undefined;
     if (value !== null && value !== undefined)

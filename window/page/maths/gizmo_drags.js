@@ -6,7 +6,7 @@
  */
 import { dot, moved, normalized, scaled, subtract } from "./vectors.js";
 
-/** Sine² of the angle between ray and axis below which their nearest points are too uncertain to follow: 3°. */
+/** Sine² of the angle of ray and axis below which their nearest points are too uncertain to follow: 3°. */
 const PARALLEL = 0.003;
 /** Least angle of an outer cone: half a degree. A choice, so that the handle can still be caught. */
 export const NARROWEST_CONE = Math.PI / 360;
@@ -74,7 +74,8 @@ export class DirectionDrag {
 
 /** The half angle of the cone about `axis` that passes through the ray, on the sphere of `radius` about the
  * apex: of the two there are, the one nearer to `current`. Radians, at most π/2.
- * @param {Ray} ray @param {Vector} apex @param {number} radius @param {Vector} axis @param {number} current */
+ * @param {Ray} ray @param {Vector} apex @param {number} radius
+ * @param {Vector} axis @param {number} current */
 export function coneThrough(ray, apex, radius, axis, current) {
   const hit = onSphere(ray, apex, radius);
   const [near, far] = [hit.near, hit.far].map((to) => Math.acos(Math.max(-1, Math.min(1, dot(to, axis)))));

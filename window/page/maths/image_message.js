@@ -17,7 +17,7 @@ export function parsedImage(message) {
 /** The media type of an image by its first bytes. @param {Uint8Array} bytes */
 export const mediaType = (bytes) => (bytes[0] === 0x89 ? "image/png" : "image/jpeg");
 
-/** Which images of a pane to show: those of a look at least as new as the one shown, in the order they came. */
+/** Which images of a pane to show: of a look at least as new as the one shown, in the order they came. */
 export class Freshness {
   look = -1;
   arrival = -1;

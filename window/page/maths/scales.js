@@ -8,7 +8,7 @@
 const STEP = 0.01;
 const FINE_STEP = 0.001;
 
-/** Significant digits of a value that is set here: as many as are shown, so that a file holds what was seen. */
+/** Significant digits of a value set here: those that are shown, so that a file holds what was seen. */
 const DIGITS = 4;
 
 /** @param {Range} range @param {number} value @returns {number} within the range, whole where it must be */

@@ -35,7 +35,7 @@ export function animationBar(model, looks) {
       // The next time is asked for once the image of the last one is there: time is real, frames are as many
       // as the server draws.
       if ((model.shown.a?.header.look ?? -1) >= asked && model.connected) {
-        asked = looks.number + 1;
+        asked = model.look + 1;
         goTo((performance.now() / 1000 - begin) % length);
       }
       requestAnimationFrame(frame);

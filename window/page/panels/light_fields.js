@@ -124,7 +124,8 @@ export class LightFields {
   }
 
   /** @param {string} id @param {string} label @param {(light: Light, value: number) => Partial<Light>} change
-   * @param {(value: number, steps: number, fine: boolean) => number} step @param {(value: number) => string} [format] */
+   * @param {(value: number, steps: number, fine: boolean) => number} step
+   * @param {(value: number) => string} [format] */
   #number(id, label, change, step, format) {
     return new NumberField(
       label,

@@ -40,7 +40,8 @@ class ParameterRow {
     this.reset.addEventListener("click", () => this.#reset(edits.gesture()));
     const label = element("span", { class: "name" }, name, element("small", {}, unit));
     const meaning = element("span", { class: "for-readers", id: `meaning-${spec.name}` }, spec.meaning);
-    label.title = `${spec.meaning}\n${formatted(spec.low)} … ${formatted(spec.high)}${unit && ` ${unit}`}, default ${formatted(spec.default)}`;
+    const bounds = `${formatted(spec.low)} … ${formatted(spec.high)} ${unit}`.trim();
+    label.title = `${spec.meaning}\n${bounds}, default ${formatted(spec.default)}`;
     for (const input of [this.slider.input, this.number.input])
       input.setAttribute("aria-describedby", meaning.id);
     this.number.draggedBy(label);

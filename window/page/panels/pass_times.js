@@ -63,9 +63,10 @@ export function passTimes(model, looks, connection) {
     );
     const over = budget !== null && timings.milliseconds > budget;
     total.classList.toggle("over", over);
+    const limit = budget === null ? "" : ` of ${milliseconds(budget)}`;
     setText(
       total,
-      `${SOURCE_NAMES[timings.source].toLowerCase()}: ${milliseconds(timings.milliseconds)}${budget ? ` of ${milliseconds(budget)}` : ""}`,
+      `${SOURCE_NAMES[timings.source].toLowerCase()}: ${milliseconds(timings.milliseconds)}${limit}`,
     );
     bar.setAttribute(
       "aria-label",

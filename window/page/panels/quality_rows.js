@@ -5,6 +5,7 @@
  * @typedef {import("../talk/edits.js").Edits} Edits
  * @typedef {import("../types.js").Quality} Quality
  * @typedef {import("../types.js").QualityValue} QualityValue
+ * @typedef {{inputs: HTMLElement[], show: (value: QualityValue) => void}} Control
  */
 import { byId, element } from "../controls/elements.js";
 import { NumberField } from "../controls/number_field.js";
@@ -15,7 +16,7 @@ import { humanised } from "../maths/words.js";
 /** What a setting says that is left to the program. */
 const AUTOMATIC = "auto";
 
-/** @param {Quality} spec @param {Edits} edits @returns {{inputs: HTMLElement[], show: (value: QualityValue) => void}} */
+/** @param {Quality} spec @param {Edits} edits @returns {Control} */
 function choiceOf(spec, edits) {
   const choices = spec.choices ?? [];
   const select = element("select", { "aria-label": humanised(spec.name) });
@@ -36,7 +37,7 @@ function choiceOf(spec, edits) {
   };
 }
 
-/** @param {Quality} spec @param {Edits} edits @returns {{inputs: HTMLElement[], show: (value: QualityValue) => void}} */
+/** @param {Quality} spec @param {Edits} edits @returns {Control} */
 function rangeOf(spec, edits) {
   const range = rangeOfBounds(Number(spec.low), Number(spec.high));
   const name = humanised(spec.name);

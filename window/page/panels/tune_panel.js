@@ -13,7 +13,8 @@ import { humanised, percent, timeLeft, titled } from "../maths/words.js";
 const PLOT_WIDTH = 200;
 const PLOT_HEIGHT = 56;
 
-/** @param {Model} model @param {Connection} connection @returns {() => void} starts a fit, or stops the one that runs */
+/** @param {Model} model @param {Connection} connection
+ * @returns {() => void} starts a fit, or stops the one that runs */
 export function tunePanel(model, connection) {
   const button = byId("tune", HTMLButtonElement);
   const press = () => {

@@ -34,7 +34,8 @@ export class CameraMoves {
     return this.looks.size[0] / this.looks.size[1] || 1;
   }
 
-  /** What the camera turns about: the last picked surface, or the depth of the scene's middle. @returns {Vector} */
+  /** What the camera turns about: the last picked surface, or the depth of the scene's middle.
+   * @returns {Vector} */
   get pivotOrMiddle() {
     if (this.pivot) return this.pivot;
     const [low, high] = this.model.scene?.bounds ?? [
@@ -55,7 +56,8 @@ export class CameraMoves {
     this.#apply(camera);
   }
 
-  /** Goes there within a quarter of a second; at once for those who want less motion. @param {Camera} camera */
+  /** Goes there within a quarter of a second; at once for those who want less motion.
+   * @param {Camera} camera */
   ease(camera) {
     this.pivot = null;
     this.#move += 1;

@@ -1,5 +1,6 @@
 /**
- * Flying: with the right button held, the pointer turns the head, W A S D Q E move and the wheel sets the speed.
+ * Flying: with the right button held, the pointer turns the head, W A S D Q E move and the wheel sets the
+ * speed.
  *
  * @typedef {import("../talk/model.js").Model} Model
  * @typedef {import("./camera_moves.js").CameraMoves} CameraMoves
@@ -81,7 +82,8 @@ export class Flight {
     requestAnimationFrame(frame);
   }
 
-  /** @param {KeyboardEvent} event @param {boolean} down @returns {boolean} whether the key was one of flight's */
+  /** @param {KeyboardEvent} event
+   * @param {boolean} down @returns {boolean} whether the key was one of flight's */
   key(event, down) {
     this.#fast = event.shiftKey;
     if (!down) this.#held.delete(event.code);
@@ -111,7 +113,8 @@ export class Flight {
     label.hidden = !this.flying;
     setText(
       label,
-      `Flying at ${formatted(this.speed, 2)} scene diagonals a second  ·  W A S D Q E  ·  wheel: speed  ·  shift: faster`,
+      `Flying at ${formatted(this.speed, 2)} scene diagonals a second  ·  W A S D Q E  ·  ` +
+        "wheel: speed  ·  shift: faster",
     );
   }
 }

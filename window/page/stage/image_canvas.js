@@ -7,7 +7,8 @@
 import { byId } from "../controls/elements.js";
 
 export class ImageCanvas {
-  /** @param {Model} model @param {import("../talk/looks.js").Looks} looks @param {import("../talk/images.js").Images} images */
+  /** @param {Model} model @param {import("../talk/looks.js").Looks} looks
+   * @param {import("../talk/images.js").Images} images */
   constructor(model, looks, images) {
     this.model = model;
     this.canvas = byId("image", HTMLCanvasElement);

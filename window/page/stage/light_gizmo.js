@@ -22,7 +22,8 @@ const CIRCLE_POINTS = 48;
 export const AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
 
 /** A circle about `axis` at `angle` from it, on a sphere about `apex`.
- * @param {Vector} apex @param {Vector} axis @param {number} angle @param {number} radius @returns {Vector[]} */
+ * @param {Vector} apex @param {Vector} axis @param {number} angle
+ * @param {number} radius @returns {Vector[]} */
 export function coneCircle(apex, axis, angle, radius) {
   const [first, second] = acrossOf(axis);
   const centre = moved(apex, axis, Math.cos(angle) * radius);
@@ -123,7 +124,11 @@ export class LightGizmo {
     const head = Math.min(13, size * 0.7);
     const [bx, by] = [x1 - ux * head, y1 - uy * head];
     const width = 4.5;
-    const tip = `M${pair(x1, y1)}L${pair(bx - uy * width, by + ux * width)}L${pair(bx + uy * width, by - ux * width)}Z`;
+    const tip = `${path([
+      [x1, y1],
+      [bx - uy * width, by + ux * width],
+      [bx + uy * width, by - ux * width],
+    ])}Z`;
     // The first pixels belong to the disc in the middle.
     const begin = Math.min(18, size * 0.5);
     const shaft = path([
@@ -151,4 +156,5 @@ const path = (points) => points.map(([x, y], index) => `${index ? "L" : "M"}${pa
 
 /** @param {number[]} centre @param {number} radius */
 const ring = ([x, y], radius) =>
-  `M${pair(x - radius, y)}a${radius} ${radius} 0 1 0 ${2 * radius} 0a${radius} ${radius} 0 1 0 ${-2 * radius} 0Z`;
+  `M${pair(x - radius, y)}` +
+  `a${radius} ${radius} 0 1 0 ${2 * radius} 0a${radius} ${radius} 0 1 0 ${-2 * radius} 0Z`;

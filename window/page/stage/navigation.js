@@ -26,7 +26,8 @@ const LINE = 33;
 const PAGE = 400;
 
 export class Navigation {
-  /** Called instead of orbiting by a press, where a tool waits for one. @type {((picked: Picked) => void) | null} */
+  /** Called instead of orbiting by a press, where a tool waits for one.
+   * @type {((picked: Picked) => void) | null} */
   clickTool = null;
   /** Surface the wheel moves towards, where the pointer was then, and where the wheel has left the camera.
    * @type {{place: Place, point: Vector, camera: Camera} | null} */
@@ -70,7 +71,8 @@ export class Navigation {
     this.#drag(event, panning ? this.#pan(event) : this.#orbit(event));
   }
 
-  /** Follows a drag until the button is up. @param {PointerEvent} down @param {(event: PointerEvent) => void} step */
+  /** Follows a drag until the button is up.
+   * @param {PointerEvent} down @param {(event: PointerEvent) => void} step */
   #drag(down, step) {
     const { stage } = this;
     let dragging = false;

@@ -20,6 +20,8 @@ function stateWords(model, pane) {
     words.push(`${shown?.bitmap ? "" : "reference "}${percent(header.share)}`);
   if (shown?.bitmap) {
     if (model.moving) words.push("moving…");
+    // Each look is answered with an image of each pane.
+    else if (header.look < model.look) words.push("drawing…");
     else words.push(header.settled ? "settled" : "refining…");
     if (header.noise !== undefined && header.noise !== null)
       words.push(`noise ${formatted(header.noise, 2)}`);
@@ -45,7 +47,8 @@ function emptyWords(model, pane) {
   const shown = model.shown[pane];
   if (!shown) return "Waiting for the image…";
   if (shown.bitmap) return "";
-  return `The reference of this view is at ${percent(shown.header.share ?? 0)}. The error is shown once it is there.`;
+  const share = percent(shown.header.share ?? 0);
+  return `The reference of this view is at ${share}. The error is shown once it is there.`;
 }
 
 /** @param {Model} model */

@@ -38,7 +38,8 @@ export class Connection {
     });
   }
 
-  /** Sends a message; without a connection it is dropped. @param {{type: string} & Record<string, any>} message */
+  /** Sends a message; without a connection it is dropped.
+   * @param {{type: string} & Record<string, any>} message */
   send(message) {
     if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(JSON.stringify(message));
   }

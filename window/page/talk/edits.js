@@ -8,7 +8,7 @@
  * @typedef {import("../types.js").Light} Light
  */
 
-/** Milliseconds after a gesture for which a sent value stands in for one that the server has not sent back. */
+/** Milliseconds after a gesture for which a sent value stands in for what the server has not sent back. */
 const AWAITED = 1500;
 
 export class Edits {

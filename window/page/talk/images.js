@@ -36,7 +36,7 @@ export class Images {
     this.model.changed("image");
   }
 
-  /** The stage has drawn what there is: tells the server, for dropped images too, as it waits for an answer. */
+  /** The stage has drawn what there is: tells the server, also of dropped images, as it waits for each. */
   acknowledge() {
     for (const look of this.#undrawn) this.connection.send({ type: "shown", look });
     this.#undrawn = [];

@@ -10,7 +10,6 @@
 const SETTLED_AFTER = 200;
 
 export class Looks {
-  /** Number of the newest look. */ number = 0;
   /** Size of the canvas in device pixels. @type {[number, number]} */ size = [0, 0];
   /** While the animation plays, a slow frame is no pause. */ playing = false;
   #scheduled = false;
@@ -28,7 +27,7 @@ export class Looks {
     this.send();
   }
 
-  /** The user moves something of the document, which the server draws by itself: only that it moves is news. */
+  /** The user moves something of the document, which the server draws by itself: that it moves is news. */
   editInput() {
     if (!this.#isMoving()) this.send();
   }
@@ -65,10 +64,10 @@ export class Looks {
     const { model, size } = this;
     if (!model.scene || !model.connected || size[0] < 1 || size[1] < 1) return;
     const { camera, a, b, layer, errorOf, seconds } = model.viewing;
-    this.number += 1;
+    model.look += 1;
     this.connection.send({
       type: "look",
-      look: this.number,
+      look: model.look,
       camera,
       size,
       moving: model.moving,

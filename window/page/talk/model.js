@@ -26,6 +26,7 @@ export class Model {
   /** Newest image of each pane. @type {Record<Pane, Shown | null>} */ shown = { a: null, b: null };
   /** Index of the selected light, or -1. */ selected = -1;
   connected = false;
+  /** Number of the newest look that was sent. */ look = 0;
   /** Whether the user is at it: images may be coarse. */ moving = false;
   /** What this browser looks at. `split` is the place of the line in [0, 1]. */
   viewing = {

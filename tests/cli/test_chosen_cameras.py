@@ -86,4 +86,4 @@ def test_a_fit_takes_all_cameras_and_views_of_ones_own(room, tmp_path):
     assert [view.name for view in views if view.split == "fitted"] == ["mine"]
     assert {view.split for view in views} == {"fitted", "validation", "held_out"}
     notes = json.loads((out / "metrics.json").read_text())["notes"]
-    assert "held_out_0 is placed automatically: --views has no held_out views" in notes
+    assert "held_out_0 is placed automatically: none of the views given is held_out" in notes

@@ -11,7 +11,9 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.files.reading_border import read_at_border
 from vpltune.renderer.scene.placement import named_cameras, resolve_camera_and_lights, views_for_scene
+from vpltune.renderer.scene.placement.scene_sidecar import completed_camera_and_lights
 from vpltune.renderer.scene.scene import Camera, Light, Scene
 from vpltune.renderer.scene.views import SPLITS, View
 from vpltune.tuner.reference import ReferenceView, reference_views
@@ -95,7 +97,7 @@ class PreparedScene:
 
 
 def prepare_scene(
-    scene_path: Path,
+    source: Path | Scene,
     options: SceneOptions,
     config: TunedConfig,
     watch: Stopwatch,
@@ -107,7 +109,7 @@ def prepare_scene(
     """Read a scene, place its views, render their references, and capture the runtime's buffers.
 
     Args:
-        scene_path: a scene file.
+        source: a scene file, or a scene in memory, which has no sidecar.
         options: views, references, camera and light.
         config: drawn in the fitted and held-out views.
         watch: measures the stages "load", "reference" and "capture".
@@ -123,8 +125,8 @@ def prepare_scene(
     keep_compiled_functions()
     with watch.stage("load"):
         progress("load", 0.0)
-        scene = read_scene(scene_path)
-        views, notes = _views(scene, scene_path, options, validated)
+        scene = read_scene(source) if isinstance(source, Path) else _required_drawable(source)
+        views, notes = _views(scene, source, options, validated)
         # Before the references, so that a machine without OpenGL fails at once.
         runtime = Runtime(scene)
         look_first(runtime, views)
@@ -166,15 +168,22 @@ def references_of(
     )
 
 
+def _required_drawable(scene: Scene) -> Scene:
+    """The scene, checked as the readers check theirs."""
+    return read_at_border(f"scene {scene.name!r:.80}", lambda: scene)
+
+
 def _views(
-    scene: Scene, scene_path: Path, options: SceneOptions, validated: bool
+    scene: Scene, source: Path | Scene, options: SceneOptions, validated: bool
 ) -> tuple[tuple[View, ...], tuple[str, ...]]:
     own = options.fixed_views
     if own is not None and not validated:
         return tuple(view for view in own if view.split in ("fitted", "held_out")), ()
     if own is not None:
         more = _further_views(scene, own, options.seed)
-        notes = [f"{view.name} is placed automatically: --views has no {view.split} views" for view in more]
+        notes = [
+            f"{view.name} is placed automatically: none of the views given is {view.split}" for view in more
+        ]
         return (*own, *more), tuple(notes)
     cameras = (options.camera,)
     if options.camera_name is not None:
@@ -184,9 +193,11 @@ def _views(
     validation = max(options.views, LEAST_VALIDATION) if validated else 0
     views, notes = [], []
     for each in cameras:
-        camera, lights, own_notes = resolve_camera_and_lights(
-            scene, scene_path, each, None if options.light is None else (options.light,)
-        )
+        given = None if options.light is None else (options.light,)
+        if isinstance(source, Path):
+            camera, lights, own_notes = resolve_camera_and_lights(scene, source, each, given)
+        else:
+            camera, lights, own_notes = completed_camera_and_lights(scene, scene.name, each, given)
         views += views_for_scene(
             scene,
             camera,
@@ -206,7 +217,7 @@ def _further_views(scene: Scene, own: tuple[View, ...], seed: int) -> tuple[View
     given = {view.split for view in own}
     first = next((view for view in own if view.split == "fitted"), None)
     if first is None:
-        raise InputError("--views: the file must have at least one view of the split 'fitted'")
+        raise InputError("views: at least one must have the split 'fitted'")
     placed = views_for_scene(
         scene,
         first.camera,

@@ -28,7 +28,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
+from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters, parameter_spec
 from vpltune.renderer.config.auto_prior import AutoPrior
 from vpltune.renderer.config.config_versions import brought_forward
 from vpltune.renderer.config.gltf_extras import GLTF_SUFFIXES, read_gltf_extras
@@ -96,6 +96,14 @@ class TunedConfig:
     fit: FitNote | None = None
     light: Mapping[str, Any] = field(default_factory=dict)
     """Reserved; kept as it was read."""
+
+    def __repr__(self) -> str:
+        fitted = ("intensity", "falloff_footprint", "extinction_coefficient")
+        values = [f"{parameter_spec(name).symbol} {getattr(self.parameters, name):.4g}" for name in fitted]
+        said = ["auto"] if self.auto is not None else values
+        said += [f"{self.parameters.vpl_count} VPLs", self.visibility]
+        said += [] if self.fit is None else [self.fit.status]
+        return f"TunedConfig({', '.join(said)})"
 
     def seen_by(self, visibility: Visibility | None) -> "TunedConfig":
         """The same config with another visibility; None keeps its own.

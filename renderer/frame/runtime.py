@@ -34,8 +34,7 @@ LAYERS: tuple[Layer, ...] = get_args(Layer)
 
 DEFAULT_OPTIONS = RuntimeOptions()
 KEPT_FRAMES = 2
-"""Frames whose targets stay on the GPU: two, so that a comparison of two configs makes none anew, and no
-more, so that images of many sizes do not add up."""
+"""Frames whose targets stay on the GPU: two, for a comparison of two configs; more would add up."""
 
 _SHARES = {"direct": (1.0, 0.0), "indirect": (0.0, 1.0)}
 
@@ -131,12 +130,14 @@ class Runtime:
         self.opengl_renderer: str = self._context.info["GL_RENDERER"]
         self._context.__enter__()
         self._scale = working_scale(scene)
-        scene = scaled(scene, self._scale) if self._scale != 1.0 else scene
+        self._scene = scene = scaled(scene, self._scale) if self._scale != 1.0 else scene
         self.scene_buffers = SceneBuffers(self._context, scene)
         self._hierarchy: RayHierarchy | None = None
-        self._scene = scene
         self._nested_faces = nested_face_count(scene)
         self._frames: OrderedDict[FrameSetup, Frame] = OrderedDict()
+
+    def __repr__(self) -> str:
+        return f"Runtime({self._scene.name!r}, {self.opengl_renderer})"
 
     @property
     def context(self) -> moderngl.Context:

@@ -4,8 +4,9 @@ The runtime and the reference renderer share this description. Every surface is 
 Lengths are in world units. Colours are linear, in the Rec. 709 primaries, unless a name says sRGB.
 """
 
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float32, Float64, Int32, UInt8
@@ -14,6 +15,8 @@ from vpltune.renderer.scene.scene_animation import Animation, Skinning
 
 Wrap = Literal["repeat", "mirrored_repeat", "clamp_to_edge"]
 LightKind = Literal["spot", "point", "directional"]
+Numbers = float | int | np.generic | Sequence[Any] | np.ndarray
+"""What becomes an array of float64: a number, a sequence of them, of any depth, or an array."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +64,9 @@ class Mesh:
     skinning: Skinning | None = None
     """The joints that deform the mesh, if they are animated. Positions and normals are then the rest pose."""
 
+    def __repr__(self) -> str:
+        return f"Mesh({self.name!r}, {len(self.positions):,} vertices, {len(self.triangles):,} triangles)"
+
 
 @dataclass(frozen=True, eq=False)
 class Instance:
@@ -72,15 +78,24 @@ class Instance:
     to_world: Float64[np.ndarray, "4 4"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Camera:
-    """A pinhole camera. `to_world` is rigid; the camera looks along its −Z axis, with +Y up."""
+    """A pinhole camera. `to_world` is rigid; the camera looks along its −Z axis, with +Y up.
+
+    Example:
+        >>> Camera(look_at([0, 1, 4], [0, 1, 0]), yfov=0.9)
+    """
 
     to_world: Float64[np.ndarray, "4 4"]
     yfov: float
     """Full vertical field of view in radians, in (0, π)."""
-    name: str = ""
+    name: str
     """Empty where it comes from no file, or has no name there."""
+
+    def __init__(self, to_world: Numbers, yfov: float, name: str = "") -> None:
+        object.__setattr__(self, "to_world", np.array(to_world, np.float64))
+        object.__setattr__(self, "yfov", float(yfov))
+        object.__setattr__(self, "name", name)
 
     @property
     def position_world(self) -> Float64[np.ndarray, "3"]:
@@ -97,13 +112,18 @@ class Camera:
         return inverse
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Light:
     """A punctual light as in KHR_lights_punctual, in radiometric units: W/sr for candela, W/m² for lux.
 
     A spot's intensity falls off between `inner_cone` and `outer_cone` (half angles in radians,
     0 ≤ inner < outer ≤ π/2) by the factor clamp((cos θ − cos outer)/(cos inner − cos outer), 0, 1)², as
     KHR_lights_punctual specifies.
+
+    Vectors may be given as any three numbers, and an intensity as one number for a white light.
+
+    Example:
+        >>> Light("spot", 10.0, position_world=[0, 2, 0], direction_world=[0, -1, 0])
 
     Raises:
         ValueError: the direction of a spot or directional light does not have unit length.
@@ -112,15 +132,36 @@ class Light:
     kind: LightKind
     intensity: Float64[np.ndarray, "3"]
     """RGB: W/sr for spot and point lights, W/m² perpendicular to the beam for directional lights."""
-    position_world: Float64[np.ndarray, "3"] = field(default_factory=lambda: np.zeros(3))
+    position_world: Float64[np.ndarray, "3"]
     """World units. A directional light ignores it."""
-    direction_world: Float64[np.ndarray, "3"] = field(default_factory=lambda: np.array([0.0, 0.0, -1.0]))
+    direction_world: Float64[np.ndarray, "3"]
     """Unit vector in which the light travels. A point light ignores it."""
-    inner_cone: float = 0.0
-    outer_cone: float = float(np.pi / 4)
-    name: str = ""
+    inner_cone: float
+    outer_cone: float
+    name: str
 
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        kind: LightKind,
+        intensity: Numbers,
+        position_world: Numbers = (0.0, 0.0, 0.0),
+        direction_world: Numbers = (0.0, 0.0, -1.0),
+        inner_cone: float = 0.0,
+        outer_cone: float = float(np.pi / 4),
+        name: str = "",
+    ) -> None:
+        white = np.ones(3) if np.ndim(intensity) == 0 else 1.0
+        values = {
+            "kind": kind,
+            "intensity": np.asarray(intensity, np.float64) * white,
+            "position_world": np.array(position_world, np.float64),
+            "direction_world": np.array(direction_world, np.float64),
+            "inner_cone": float(inner_cone),
+            "outer_cone": float(outer_cone),
+            "name": name,
+        }
+        for field_name, value in values.items():
+            object.__setattr__(self, field_name, value)
         length = float(np.linalg.norm(self.direction_world))
         # 1e-4 tolerates single precision and numbers written with five digits.
         if self.kind != "point" and not abs(length - 1.0) <= 1e-4:
@@ -145,6 +186,19 @@ class Scene:
     """One line for each kind of content in the file that is ignored or approximated."""
     animation: Animation | None = None
     """The motion, if any. All other fields describe the rest pose."""
+
+    def __repr__(self) -> str:
+        counts = {
+            "triangle": self.triangle_count(),
+            "instance": len(self.instances),
+            "material": len(self.materials),
+            "texture": len(self.textures),
+            "light": len(self.lights),
+            "camera": len(self.cameras),
+        }
+        said = [f"{count:,} {what}{'s' * (count != 1)}" for what, count in counts.items() if count]
+        moves = [] if self.animation is None else ["animated"]
+        return f"Scene({', '.join([repr(self.name), *said, *moves])})"
 
     def triangle_count(self) -> int:
         """Triangles of all instances; a mesh counts once per instance."""
@@ -223,25 +277,27 @@ def without_scale(to_world: Float64[np.ndarray, "4 4"]) -> Float64[np.ndarray, "
 
 
 def look_at(
-    eye: Float64[np.ndarray, "3"],
-    target: Float64[np.ndarray, "3"],
-    up: Float64[np.ndarray, "3"] | None = None,
+    eye: Numbers,
+    target: Numbers,
+    up: Numbers | None = None,
 ) -> Float64[np.ndarray, "4 4"]:
     """Camera-to-world matrix of a camera at `eye` that looks at `target` along its −Z axis, with +Y up.
 
-    `up` defaults to world +Y, or to world −Z if the view direction is within 2.5 degrees of vertical.
+    Each is three numbers, in world units. `up` defaults to world +Y, or to world −Z if the view direction is
+    within 2.5 degrees of vertical.
 
     Raises:
         ValueError: `eye` and `target` coincide.
     """
-    backward = np.asarray(eye, np.float64) - np.asarray(target, np.float64)
+    eye = np.asarray(eye, np.float64)
+    backward = eye - np.asarray(target, np.float64)
     distance = np.linalg.norm(backward)
     if not distance > 0.0:
-        raise ValueError(f"look_at: eye and target must differ, got {tuple(eye)} twice")
+        raise ValueError(f"look_at: eye and target must differ, got {eye.tolist()} twice")
     backward = backward / distance
     if up is None:
-        up = np.array([0.0, 1.0, 0.0]) if abs(backward[1]) < 0.999 else np.array([0.0, 0.0, -1.0])
-    right = np.cross(up, backward)
+        up = (0.0, 1.0, 0.0) if abs(backward[1]) < 0.999 else (0.0, 0.0, -1.0)
+    right = np.cross(np.asarray(up, np.float64), backward)
     right /= np.linalg.norm(right)
     matrix = np.eye(4)
     matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3] = (

@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -35,6 +35,12 @@ class View:
     """Width and height in pixels."""
     camera: Camera
     lights: tuple[Light, ...]
+
+    def __repr__(self) -> str:
+        width, height = self.size
+        eye = ", ".join(f"{value:.4g}" for value in self.camera.position_world)
+        lights = " + ".join(light.kind for light in self.lights) or "no light"
+        return f"View({self.name!r}, {self.split}, {width}×{height}, eye ({eye}), {lights})"
 
 
 def scaled_view(view: View, factor: float) -> View:
@@ -73,21 +79,19 @@ def light_to_json(light: Light) -> dict[str, Any]:
     }
 
 
+def _view_to_json(view: View) -> dict[str, Any]:
+    return {
+        "name": view.name,
+        "split": view.split,
+        "size": np.asarray(view.size).tolist(),
+        "camera": camera_to_json(view.camera),
+        "lights": [light_to_json(light) for light in view.lights],
+    }
+
+
 def views_to_json(scene_path: str, views: tuple[View, ...]) -> dict[str, Any]:
     """The contents of `views.json`. Lengths are in world units, angles in radians."""
-    return {
-        "scene": scene_path,
-        "views": [
-            {
-                "name": view.name,
-                "split": view.split,
-                "size": list(view.size),
-                "camera": camera_to_json(view.camera),
-                "lights": [light_to_json(light) for light in view.lights],
-            }
-            for view in views
-        ],
-    }
+    return {"scene": scene_path, "views": [_view_to_json(view) for view in views]}
 
 
 def write_views(path: Path, scene_path: str, views: tuple[View, ...]) -> None:
@@ -121,6 +125,41 @@ def _views(text: str, path: str | Path) -> tuple[View, ...]:
     if not isinstance(entries, list) or not entries:
         raise InputError(f"{path}: key 'views' must be a list of at least one view")
     return tuple(_view_from_json(entry, f"{path}: views[{index}]") for index, entry in enumerate(entries))
+
+
+def checked_view(view: View, where: str) -> View:
+    """A view made in Python, held to the rules of `views.json`; a spot's hard edge is softened as there.
+
+    Raises:
+        InputError: it is no view, or a field has a value that is not allowed. `where` names it.
+    """
+    _require_type(view, View, where)
+    _require_type(view.camera, Camera, f"{where}.camera")
+    if not isinstance(view.lights, tuple | list):
+        raise InputError(f"{where}.lights: must be a tuple of lights, got {type(view.lights).__name__}")
+    for index, light in enumerate(view.lights):
+        _require_type(light, Light, f"{where}.lights[{index}]")
+    checked = _view_from_json(_view_to_json(view), where)
+    # The file has no names of cameras and lights.
+    lights = (replace(new, name=old.name) for new, old in zip(checked.lights, view.lights, strict=True))
+    return replace(checked, camera=replace(checked.camera, name=view.camera.name), lights=tuple(lights))
+
+
+def checked_camera(camera: Camera, where: str) -> Camera:
+    """A camera made in Python, held to the rules of `views.json`. Raises as `checked_view`."""
+    _require_type(camera, Camera, where)
+    return replace(camera_from_json(camera_to_json(camera), where), name=camera.name)
+
+
+def checked_light(light: Light, where: str) -> Light:
+    """A light made in Python, held to the rules of `views.json`. Raises as `checked_view`."""
+    _require_type(light, Light, where)
+    return replace(light_from_json(light_to_json(light), where), name=light.name)
+
+
+def _require_type(value: Any, kind: type, where: str) -> None:
+    if not isinstance(value, kind):
+        raise InputError(f"{where}: must be a {kind.__name__}, got {type(value).__name__}")
 
 
 def _view_from_json(entry: Any, where: str) -> View:

@@ -98,4 +98,4 @@ def test_a_fit_takes_all_cameras_and_views_of_ones_own(room, tmp_path):
     assert [view.name for view in views if view.split == "fitted"] == ["mine"]
     assert {view.split for view in views} == {"fitted", "validation", "held_out"}
     notes = json.loads((out / "metrics.json").read_text())["notes"]
-    assert "--views has no held-out views: they are placed automatically" in notes
+    assert "none of the views given is held out: such views are placed automatically" in notes

@@ -2,13 +2,11 @@
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float32, UInt8
 from PIL import Image, ImageDraw, ImageFont
 
-from vpltune.renderer.files.image_file import write_png
 from vpltune.renderer.files.srgb import LUMINANCE
 from vpltune.renderer.frame.passes.tone_mapping import EXPOSURE_KEY
 from vpltune.renderer.frame.runtime import Runtime
@@ -29,24 +27,20 @@ Image8 = UInt8[np.ndarray, "height width 3"]
 Pixels = UInt8[np.ndarray, "rows columns 3"]
 
 
-def write_comparison(path: Path, runtime: Runtime, views: tuple[tuple[str, EvaluatedView], ...]) -> None:
-    """Write three rows of panels for each view: whole images, indirect light and signed error.
+def comparison_image(runtime: Runtime, views: tuple[tuple[str, EvaluatedView], ...]) -> Pixels:
+    """Three rows of panels for each view: whole images, indirect light and signed error; sRGB.
 
     Where tuned draws what default does, one panel stands for both. Pixels are repeated, never blended, until
     a panel has at least `PANEL_WIDTH` × `PANEL_HEIGHT` of them.
 
     Args:
-        path: the .png to write.
         runtime: maps radiance to display colours.
         views: each with the reason that it is shown for.
-
-    Raises:
-        InputError: the path cannot be written to.
     """
     rows = [row for shown_for, view in views for row in _rows(runtime, view, shown_for)]
     width = max(row.shape[1] for row in rows)
     rows = [np.pad(row, ((0, 0), (0, width - row.shape[1]), (0, 0)), constant_values=255) for row in rows]
-    write_png(path, np.concatenate(rows))
+    return np.concatenate(rows)
 
 
 def image_row(

@@ -12,7 +12,9 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.files.reading_border import read_at_border
 from vpltune.renderer.scene.placement import named_cameras, resolve_camera_and_lights, views_for_scene
+from vpltune.renderer.scene.placement.scene_sidecar import completed_camera_and_lights
 from vpltune.renderer.scene.scene import Camera, Light, Scene
 from vpltune.renderer.scene.views import SPLITS, View
 from vpltune.tuner.reference import ReferenceView, reference_views
@@ -93,12 +95,12 @@ class PreparedScene:
     """The validation views with their references; empty unless `prepare_scene` was asked for them."""
     notes: tuple[str, ...]
     """Remarks for the user: what was ignored in the file, and which camera and light were chosen."""
-    file_sha256: str
-    """Hex SHA-256 of the scene file when it was read; a fit takes minutes, in which it may change."""
+    file_sha256: str | None
+    """Hex SHA-256 of the scene file when it was read: it may change during a fit. None for a scene in memory."""
 
 
 def prepare_scene(
-    scene_path: Path,
+    source: Path | Scene,
     options: SceneOptions,
     config: TunedConfig,
     watch: Stopwatch,
@@ -110,7 +112,7 @@ def prepare_scene(
     """Read a scene, place its views, render their references, and capture the runtime's buffers.
 
     Args:
-        scene_path: a scene file.
+        source: a scene file, or a scene in memory, which has no sidecar.
         options: views, references, camera and light.
         config: drawn in the fitted and held-out views.
         watch: measures the stages "load", "reference" and "capture".
@@ -126,10 +128,14 @@ def prepare_scene(
     keep_compiled_functions()
     with watch.stage("load"):
         progress("load", 0.0)
-        scene = read_scene(scene_path)
-        with scene_path.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
-        views, notes = _views(scene, scene_path, options, validated)
+        digest = None
+        if isinstance(source, Path):
+            scene = read_scene(source)
+            with source.open("rb") as file:
+                digest = hashlib.file_digest(file, "sha256").hexdigest()
+        else:
+            scene = _required_drawable(source)
+        views, notes = _views(scene, source, options, validated)
         # Before the references, so that a machine without OpenGL fails at once.
         runtime = Runtime(scene)
         look_first(runtime, views)
@@ -171,18 +177,25 @@ def references_of(
     )
 
 
+def _required_drawable(scene: Scene) -> Scene:
+    """The scene, checked as the readers check theirs."""
+    return read_at_border(f"scene {scene.name!r:.80}", lambda: scene)
+
+
 def _views(
-    scene: Scene, scene_path: Path, options: SceneOptions, validated: bool
+    scene: Scene, source: Path | Scene, options: SceneOptions, validated: bool
 ) -> tuple[tuple[View, ...], tuple[str, ...]]:
     own = options.fixed_views
     if own is not None and all(view.split != "fitted" for view in own):
-        raise InputError("--views: the file must have at least one view of the split 'fitted'")
+        raise InputError("views: at least one must have the split 'fitted'")
     if own is not None and not validated:
         return tuple(view for view in own if view.split in ("fitted", "held_out")), ()
     if own is not None:
         more = _further_views(scene, own, options.seed)
-        lacking = dict.fromkeys(view.split.replace("_", "-") for view in more)
-        notes = [f"--views has no {split} views: they are placed automatically" for split in lacking]
+        lacking = dict.fromkeys(view.split.replace("_", " ") for view in more)
+        notes = [
+            f"none of the views given is {split}: such views are placed automatically" for split in lacking
+        ]
         return (*own, *more), tuple(notes)
     cameras = (options.camera,)
     if options.camera_name is not None:
@@ -192,9 +205,11 @@ def _views(
     validation = max(options.views, LEAST_VALIDATION) if validated else 0
     views, notes = [], []
     for each in cameras:
-        camera, lights, own_notes = resolve_camera_and_lights(
-            scene, scene_path, each, None if options.light is None else (options.light,)
-        )
+        given = None if options.light is None else (options.light,)
+        if isinstance(source, Path):
+            camera, lights, own_notes = resolve_camera_and_lights(scene, source, each, given)
+        else:
+            camera, lights, own_notes = completed_camera_and_lights(scene, scene.name, each, given)
         views += views_for_scene(
             scene,
             camera,

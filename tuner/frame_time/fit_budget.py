@@ -42,7 +42,7 @@ def fit_to_budget(
     prepared: PreparedScene,
     start: TunedConfig,
     options: BudgetOptions,
-    output: Path,
+    output: Path | None,
     *,
     seed: int = 0,
     progress: Callable[[float], None] = lambda share: None,
@@ -53,7 +53,7 @@ def fit_to_budget(
         prepared: the scene; at least one of its fitted views is lit.
         start: where the fit begins; has no prior.
         options: budget, front and frame size.
-        output: folder that a front's configs, table and plot are written to.
+        output: folder that a front's configs, table and plot are written to; may be None without a front.
         seed: selects pixels and rotations.
         progress: called with the share done, in [0, 1].
 
@@ -76,6 +76,7 @@ def fit_to_budget(
         found["budget"] = {"frame_size": list(size), **best.document()}
         begin = end
     if options.pareto:
+        assert output is not None, "a front is written to a folder"
         points = fit_front(budget, lambda share: progress(begin + (1.0 - begin) * share))
         found["pareto"] = write_front(output, points, start, size)
         best = best or points[-1]

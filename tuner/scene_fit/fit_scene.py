@@ -10,13 +10,16 @@ from typing import Any
 import numpy as np
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, placement
-from vpltune.renderer.config.tuned_config import FitNote, TunedConfig, read_config, write_config
+from vpltune.renderer.config.tuned_config import FitNote, TunedConfig, write_config
+from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import require_writable, write_text_whole, written_together
+from vpltune.renderer.files.image_file import write_png
 from vpltune.renderer.files.strict_json import strict_json
 from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.scene.scene import Scene
 from vpltune.renderer.scene.views import View, write_views
 from vpltune.tuner.doctor.jax_platform import require_jax_platform
-from vpltune.tuner.evaluation.comparison_image import write_comparison
+from vpltune.tuner.evaluation.comparison_image import comparison_image
 from vpltune.tuner.evaluation.error_breakdown import error_breakdown
 from vpltune.tuner.evaluation.evaluate import Evaluation, evaluate
 from vpltune.tuner.evaluation.evidence import doubts, undetermined
@@ -31,6 +34,7 @@ from vpltune.tuner.evaluation.prepare_scene import (
 from vpltune.tuner.evaluation.validation import candidates, validation_metrics
 from vpltune.tuner.evaluation.view_images import write_view_images
 from vpltune.tuner.fitting.fit_density import FEW_VPLS, table_rotations
+from vpltune.tuner.fitting.fit_own_loss import Loss, loss_name
 from vpltune.tuner.fitting.fit_placement import Trace
 from vpltune.tuner.fitting.fit_status import Descent, FitStatus, Outcome
 from vpltune.tuner.fitting.search_space import SearchSpace
@@ -38,6 +42,7 @@ from vpltune.tuner.frame_time.fit_budget import BudgetOptions
 from vpltune.tuner.frame_time.frame_budget import LEAST_COUNT
 from vpltune.tuner.frame_time.least_frame import require_possible_budget
 from vpltune.tuner.reference.content_key import scene_digest
+from vpltune.tuner.scene_fit.fit_result import FitResult
 from vpltune.tuner.scene_fit.fit_search import Search, search
 from vpltune.tuner.scene_fit.prior_in_fit import auto_candidate, fit_start, prior_metrics
 from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
@@ -59,55 +64,15 @@ class FitOptions(SceneOptions):
     """Accepts only a result that flickers no more than the start when lights move."""
     traced: Trace | None = None
     """Called with parameters that the search tried and their cost, for someone who watches."""
+    loss: Loss | None = None
+    """Fits k, α and κ to a function of one's own (`tuner.fitting.fit_own_loss`); excludes `budget`."""
     command: str | None = None
     """The command line, for the provenance in metrics.json; None if the fit was called from Python."""
 
 
-@dataclass(frozen=True, eq=False)
-class FitResult:
-    """The result of `fit_scene`."""
-
-    config: TunedConfig
-    """The config in tuned.json: the tuned one, or the start if it was kept."""
-    status: Outcome
-    descent: Descent
-    evaluation: Evaluation
-    notes: tuple[str, ...]
-    """Remarks for the user, one sentence each."""
-    document: dict[str, Any]
-    """The content of metrics.json, which `vpltune fit --json` prints."""
-
-
-def fit(
-    scene: str | Path,
-    output: str | Path,
-    *,
-    config: str | Path = "default",
-    progress: Progress | None = None,
-    **options: Any,
+def fit_scene(
+    source: Path | Scene, output: Path | None, options: FitOptions, progress: Progress
 ) -> FitResult:
-    """Fit a scene from Python, as `vpltune fit` does.
-
-    Args:
-        scene: a glTF, OBJ or PLY file.
-        output: folder for tuned.json, views.json, metrics.json, images.npz and comparison.png.
-        config: where the fit begins: a config file, "default" or "auto".
-        progress: called with the name of a stage and the share of it that is done, in [0, 1].
-        options: fields of `FitOptions`: views, seed, bounces, camera, light, size …
-
-    Raises:
-        InputError: the config, the scene, its sidecar or the output folder cannot be used.
-        MachineError: there is no OpenGL 4.5, or the GPU ran out of memory.
-
-    Example:
-        >>> result = vpltune.fit("configs/scenes/cornell-box.glb", "out/cornell", views=4)
-        >>> vpltune.Runtime(vpltune.read_scene(path)).render(view, result.config)
-    """
-    chosen = FitOptions(start=read_config(config), **options)
-    return fit_scene(Path(scene), Path(output), chosen, progress or (lambda stage, share: None))
-
-
-def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Progress) -> FitResult:
     """Fit a scene; write tuned.json, views.json, metrics.json, images.npz and comparison.png to `output`.
 
     No file is written before the fit and its measurement are done, except a front of `options.budget`, and
@@ -115,20 +80,23 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
     interrupted run does not render them again.
 
     Args:
-        scene_path: a scene file.
-        output: the folder to write to; created if it does not exist.
+        source: a scene file, or a scene in memory.
+        output: the folder to write to, created if it does not exist; None writes nothing.
         options: what to fit, and in which views.
         progress: called with the name of a stage and the share of it that is done, in [0, 1].
 
     Raises:
-        InputError: the scene, its sidecar or the output folder cannot be used, or no frame meets the budget.
+        InputError: the scene, its sidecar, the output folder or the loss cannot be used, no frame meets the
+            budget, or options exclude each other.
         MachineError: there is no OpenGL 4.5, or the GPU ran out of memory.
     """
     watch = Stopwatch()
-    require_writable(output)
+    _require_compatible(options, output)
+    if output is not None:
+        require_writable(output)
     require_jax_platform()
     prepared = prepare_scene(
-        scene_path,
+        source,
         options,
         options.start,
         watch,
@@ -156,16 +124,17 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
     notes = (*prepared.notes, *evaluation.notes(), *found.notes)
     descent = found.descent
     document = {
-        "scene": str(scene_path),
+        "scene": str(source) if isinstance(source, Path) else source.name,
         "parameters": config.parameters.as_dict(),
         "visibility": config.visibility,
         "quality": config.quality.as_dict(),
-        "views": str(output / "views.json"),
+        "views": None if output is None else str(output / "views.json"),
         "metrics": evaluation.summary(),
         "seconds": watch.report(),
         "status": found.status,
         "sentence": found.sentence,
         "loss": {
+            "function": None if options.loss is None else loss_name(options.loss),
             "start": descent.start_loss,
             "end": descent.loss,
             "steps": len(descent.losses) - 1,
@@ -186,13 +155,38 @@ def fit_scene(scene_path: Path, output: Path, options: FitOptions, progress: Pro
             "command": options.command,
         },
     }
+    result = FitResult(
+        config=config,
+        status=found.status,
+        descent=descent,
+        evaluation=evaluation,
+        notes=notes,
+        document=document,
+        fitted=found.fitted,
+        start=start.parameters,
+        views=views,
+        comparison=comparison_image(prepared.runtime, evaluation.most_and_least_gained()),
+    )
+    if output is not None:
+        _write(result, output)
+    return result
+
+
+def _write(result: FitResult, output: Path) -> None:
     with written_together(output) as folder:
-        write_views(folder / "views.json", str(scene_path), views)
-        write_comparison(folder / "comparison.png", prepared.runtime, evaluation.most_and_least_gained())
-        write_view_images(folder / "images.npz", evaluation.views)
-        write_config(folder / "tuned.json", config)
-        write_text_whole(folder / "metrics.json", strict_json(document) + "\n")
-    return FitResult(config, found.status, descent, evaluation, notes, document)
+        write_views(folder / "views.json", result.document["scene"], result.views)
+        write_png(folder / "comparison.png", result.comparison)
+        write_view_images(folder / "images.npz", result.evaluation.views)
+        write_config(folder / "tuned.json", result.config)
+        write_text_whole(folder / "metrics.json", strict_json(result.document) + "\n")
+
+
+def _require_compatible(options: FitOptions, output: Path | None) -> None:
+    budget = options.budget
+    if budget is not None and options.loss is not None:
+        raise InputError("loss: cannot be fitted to a frame-time budget; leave out budget")
+    if budget is not None and budget.pareto and output is None:
+        raise InputError("output: must be a folder for the files of a Pareto front, got None")
 
 
 def _require_budget(options: FitOptions, runtime: Runtime, views: tuple[View, ...]) -> None:
@@ -214,6 +208,8 @@ class _Found:
     start: TunedConfig
     """The start with the VPL count and quality of `config`, so that both cost the same."""
     descent: Descent
+    fitted: ArtistParameters
+    """What the search found, whether or not it was accepted."""
     known: dict[str, Any] = field(default_factory=dict)
     """`tuner.fitting.uncertainty.Interval` by parameter."""
     verdict: Verdict | None = None
@@ -227,14 +223,14 @@ class _Found:
 def _unlit(start: TunedConfig) -> _Found:
     point = SearchSpace().point(start.parameters)
     descent = Descent(point, float("nan"), float("nan"), np.array([np.nan]), FitStatus.NOTHING_LIT)
-    return _Found("unlit", descent.status.value, start, start, descent)
+    return _Found("unlit", descent.status.value, start, start, descent, start.parameters)
 
 
 def _judged(
     prepared: PreparedScene,
     start: TunedConfig,
     options: FitOptions,
-    output: Path,
+    output: Path | None,
     watch: Stopwatch,
     progress: Progress,
 ) -> _Found:
@@ -245,6 +241,7 @@ def _judged(
             start,
             output,
             budget=options.budget,
+            loss=options.loss,
             seed=options.seed,
             progress=lambda share: progress("fit", share),
             traced=options.traced,
@@ -284,6 +281,7 @@ def _judged(
         baseline.with_parameters(parameters),
         baseline,
         found.descent,
+        found.tuned,
         known,
         chosen,
         found.views,
@@ -374,9 +372,10 @@ def _keeps_prior(found: _Found, options: FitOptions) -> bool:
 
 
 def _config(prepared: PreparedScene, found: _Found, options: FitOptions) -> TunedConfig:
+    file = {} if prepared.file_sha256 is None else {"scene_file_sha256": prepared.file_sha256}
     provenance: dict[str, str | int | float] = {
         "scene": prepared.scene.name,
-        "scene_file_sha256": prepared.file_sha256,
+        **file,
         "scene_content_sha256": scene_digest(prepared.scene),
         "vpltune": importlib.metadata.version("vpltune"),
         "mitsuba": importlib.metadata.version("mitsuba"),

@@ -11,6 +11,7 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene
 from vpltune.tuner.fitting.choose_placement import choose_placement
 from vpltune.tuner.fitting.fit_density import FEW_VPLS, density_document, fit_density, with_discs
+from vpltune.tuner.fitting.fit_own_loss import Loss, fit_own_loss
 from vpltune.tuner.fitting.fit_placement import Trace, fit_placement, ready_views
 from vpltune.tuner.fitting.fit_status import Descent
 from vpltune.tuner.fitting.fit_views import robust_errors
@@ -41,9 +42,10 @@ class Search:
 def search(
     prepared: PreparedScene,
     start: TunedConfig,
-    output: Path,
+    output: Path | None,
     *,
     budget: BudgetOptions | None,
+    loss: Loss | None,
     seed: int,
     progress: Callable[[float], None],
     traced: Trace | None = None,
@@ -53,16 +55,20 @@ def search(
     Args:
         prepared: the scene; at least one of its fitted views is lit.
         start: where the search begins; has no prior.
-        output: folder that a front of `budget` is written to.
+        output: folder that a front of `budget` is written to; may be None without a front.
         budget: pick VPL count and quality settings that meet a frame time; overrides the start's.
+        loss: replaces the built-in objective (`tuner.fitting.fit_own_loss`); excludes `budget`.
         seed: selects pixels and rotations.
         progress: called with the share done, in [0, 1].
         traced: called with parameters that were tried and their cost; not within a budget.
 
     Raises:
-        InputError: no frame meets the budget.
+        InputError: no frame meets the budget, or `loss` is not one finite number.
     """
     views = tuple(view for view in prepared.views if view.view.split == "fitted" and view.lit)
+    if loss is not None:
+        tuned, descent = fit_own_loss(views, start.parameters, loss, seed=seed, progress=progress)
+        return Search(start.parameters, tuned, start.quality, descent, {}, views)
     if budget is not None:
         met, descent, found = fit_to_budget(prepared, start, budget, output, seed=seed, progress=progress)
         start = replace(start, quality=met.quality)

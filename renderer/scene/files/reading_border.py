@@ -1,4 +1,4 @@
-"""The border of every scene reader: what is raised within becomes one line with file and cause."""
+"""The border of every way to make a scene: what is raised within becomes one line with file and cause."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -11,8 +11,12 @@ from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, SMALLEST_EXT
 from vpltune.renderer.scene.scene import Scene
 
 
-def read_at_border(path: Path, read: Callable[[], Scene]) -> Scene:
+def read_at_border(path: Path | str, read: Callable[[], Scene]) -> Scene:
     """The scene that `read` returns, checked to have triangles and a size that can be drawn.
+
+    Args:
+        path: the file, or what else the scene comes from, for messages.
+        read: reads or makes the scene.
 
     Raises:
         InputError: the reader, or a library below it, raised anything else than an error of its own kind.

@@ -55,7 +55,10 @@ def finished_mesh(
         (surface.uv, "uv", 1e9),
     ):
         if values is not None and values.size and not np.abs(values).max() <= largest:
-            raise SceneFileError(f"{where}: {what} must be finite and at most {largest:g} in magnitude")
+            wrong = values[~(np.abs(values) <= largest)][0]
+            raise SceneFileError(
+                f"{where}: {what} must be finite and at most {largest:g} in magnitude, got {wrong:g}"
+            )
     face_normals, has_area = _face_normals(surface.positions, surface.triangles)
     if not has_area.any():
         return None

@@ -119,13 +119,13 @@ def resolve_camera_and_lights(
 
 
 def completed_camera_and_lights(
-    scene: Scene, scene_path: Path, camera: Camera | None, lights: tuple[Light, ...] | None
+    scene: Scene, where: Path | str, camera: Camera | None, lights: tuple[Light, ...] | None
 ) -> tuple[Camera, tuple[Light, ...], tuple[str, ...]]:
-    """The camera and lights given, or else the scene file's, or else automatic ones; with notes.
+    """The camera and lights given, or else the scene's own, or else automatic ones; with notes.
 
     Args:
         scene: the scene.
-        scene_path: its file, for messages.
+        where: its file or name, for messages.
         camera: None to choose one.
         lights: None to choose them.
 
@@ -133,13 +133,13 @@ def completed_camera_and_lights(
         InputError: the scene has no triangles.
     """
     if not scene.triangle_count():
-        raise InputError(f"{scene_path}: a scene must have at least one triangle, got none")
+        raise InputError(f"{where}: a scene must have at least one triangle, got none")
     notes = []
     if camera is None and scene.cameras:
         camera = scene.cameras[0]
         if len(scene.cameras) > 1:
             notes.append(
-                f"the file has {len(scene.cameras)} cameras; the first one is used (--camera takes another)"
+                f"the scene has {len(scene.cameras)} cameras; the first one is used (--camera takes another)"
             )
     own_lights = lights is not None
     lights = lights if own_lights else scene.lights
@@ -153,7 +153,7 @@ def completed_camera_and_lights(
         if lit_fraction(space, seen_by(space, camera), lights) >= LEAST_LIT:
             return camera, lights, tuple(notes)
         notes.append(
-            f"the file's {'light reaches' if len(lights) == 1 else 'lights reach'} nothing the camera sees"
+            f"the scene's {'light reaches' if len(lights) == 1 else 'lights reach'} nothing the camera sees"
         )
     light, note = default_light(scene, camera)
     return camera, (light,), (*notes, note)

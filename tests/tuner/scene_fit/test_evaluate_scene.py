@@ -77,5 +77,5 @@ def test_a_cache_that_cannot_be_written_to_keeps_no_views(view, tmp_path, monkey
 @pytest.mark.parametrize("split", ["held_out", "validation"])
 def test_views_of_ones_own_need_a_fitted_one(view, split):
     options = EvaluateOptions(tuned=FINE, fixed_views=(replace(view, split=split),))
-    with pytest.raises(InputError, match="--views: the file must have at least one view of the split"):
+    with pytest.raises(InputError, match="views: at least one must have the split"):
         evaluate_scene(SCENE, options, lambda stage, share: None)

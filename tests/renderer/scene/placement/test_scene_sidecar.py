@@ -158,7 +158,7 @@ def test_a_light_of_the_file_that_lights_nothing_in_sight_is_replaced_and_that_i
     scene = with_lights(colored_room(), above)
     _, lights, notes = resolve_camera_and_lights(scene, tmp_path / "room.glb", view.camera, None)
     assert lights[0] is not above
-    assert "the file's light reaches nothing the camera sees" in notes[0]
+    assert "the scene's light reaches nothing the camera sees" in notes[0]
     assert "light chosen automatically" in notes[1]
 
 

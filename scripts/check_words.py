@@ -20,7 +20,7 @@ from io import StringIO
 from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-FOLDERS = ("renderer", "tuner", "vpltune", "shaders", "benchmarks", "scripts")
+FOLDERS = ("renderer", "tuner", "window", "vpltune", "shaders", "benchmarks", "scripts")
 GLSL_SUFFIXES = (".glsl", ".comp", ".vert", ".frag")
 # Names that every reader knows.
 KNOWN_CONSTANTS = ("PI",)

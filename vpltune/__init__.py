@@ -11,6 +11,7 @@ Views:    View, read_views
 Configs:  TunedConfig, ArtistParameters, read_config, write_config
 Images:   Runtime
 Fits:     fit, FitResult, FitOptions; surrogate, the gather in JAX
+Windows:  view, Window
 Errors:   InputError, MachineError
 
 Names are imported when they are first used: reading a config loads neither OpenGL nor JAX.

@@ -39,7 +39,7 @@ from vpltune.window.requests import (
 )
 
 JPEG_QUALITY = 88
-"""Of frames in motion. A choice: differences are below what one sees while things move."""
+"""Quality of frames in motion. A choice: differences are below what one sees while things move."""
 SURFACES_ALONE = TunedConfig(
     ArtistParameters(vpl_count=1, lloyd_iterations=0),
     visibility="transmittance",

@@ -21,9 +21,9 @@ class Effort:
     """What is left of a frame's work."""
 
     divisor: int
-    """Of the image's sides."""
+    """What the image's sides are divided by."""
     vpl_share: float
-    """Of the VPL count."""
+    """Share of the VPL count."""
     map_size: int
     """Most texels along the side of a visibility map."""
     rsm_resolution: int

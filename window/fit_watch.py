@@ -24,7 +24,7 @@ class FitWatch:
     running: bool = False
     stage: str = ""
     share: float = 0.0
-    """Of the stage, in [0, 1]."""
+    """Share of the stage, in [0, 1]."""
     losses: list[float] = field(default_factory=list)
     """Least loss so far, at each of the tried parameters."""
     best: dict[str, Any] | None = None
@@ -32,7 +32,7 @@ class FitWatch:
     status: str = ""
     sentence: str = ""
     intervals: dict[str, tuple[float, float]] = field(default_factory=dict)
-    """Of the parameters of the tuned config."""
+    """Intervals of the parameters of the tuned config."""
     _begun: float = 0.0
 
     def begin(self) -> None:

@@ -32,7 +32,7 @@ class Window:
     def __init__(self, process: Any, connection: Any, address: str):
         self._process, self._connection = process, connection
         self.address = address
-        """Of the page, for a browser."""
+        """The address of the page, for a browser."""
         atexit.register(self.close)
 
     @property

@@ -165,7 +165,7 @@ class ReferenceStep:
 
     request: ReferenceRequest
     share: float
-    """Of the work done, in [0, 1]; 1 is the end."""
+    """Share of the work done, in [0, 1]; 1 is the end."""
     noise: float | None
     """relMSE of the noise of `path`."""
     path: Path | None
@@ -192,9 +192,9 @@ class FitStep:
 
     stage: str
     share: float
-    """Of the stage, in [0, 1]."""
+    """Share of the stage, in [0, 1]."""
     loss: float | None = None
-    """Of `parameters`, on the fitted views."""
+    """Loss of `parameters`, on the fitted views."""
     parameters: dict[str, Any] | None = None
 
 

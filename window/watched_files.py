@@ -12,7 +12,7 @@ class _Stamp:
     inode: int
     bytes: int
     nanoseconds: int
-    """Of the last change."""
+    """Time of the last change."""
 
 
 class WatchedFiles:

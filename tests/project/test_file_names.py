@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-PACKAGES = ("renderer", "tuner", "benchmarks", "configs", "shaders", "tests")
+PACKAGES = ("renderer", "tuner", "window", "benchmarks", "configs", "shaders", "tests")
 SAY_NOTHING = {"utils", "util", "common", "helpers", "helper", "misc", "core", "base"}
 
 PYTHON_FILES = sorted(path for package in PACKAGES for path in (REPOSITORY / package).rglob("*.py"))
@@ -17,7 +17,7 @@ def test_no_python_file_has_a_name_that_says_nothing():
     assert not [str(path) for path in PYTHON_FILES if path.stem.lower() in SAY_NOTHING]
 
 
-@pytest.mark.parametrize("package", ["renderer", "tuner"])
+@pytest.mark.parametrize("package", ["renderer", "tuner", "window"])
 def test_package_files_only_export(package):
     """An `__init__.py` holds its docstring, imports, `__all__` and the lazy `__getattr__`, no more."""
     for path in (REPOSITORY / package).rglob("__init__.py"):

@@ -15,7 +15,7 @@ import pytest
 from vpltune.tuner.doctor.extras import EXTRA_MODULES
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-FOLDERS = ("renderer", "tuner", "shaders", "configs")
+FOLDERS = ("renderer", "tuner", "window", "shaders", "configs")
 # Run by Python itself at its start: the modules are not found, as if they were not installed.
 BLOCKER = f"""
 import sys

@@ -96,7 +96,7 @@ class PreparedScene:
     notes: tuple[str, ...]
     """Remarks for the user: what was ignored in the file, and which camera and light were chosen."""
     file_sha256: str | None
-    """Hex SHA-256 of the scene file when it was read: it may change during a fit. None for a scene in memory."""
+    """Hex SHA-256 of the scene file when it was read: a fit takes minutes. None for a scene in memory."""
 
 
 def prepare_scene(

@@ -75,13 +75,21 @@ class ImageDecoder:
                 f"{where}: an image must be at most {MAX_IMAGE_SIDE} texels on a side and "
                 f"{MAX_IMAGE_TEXELS:,} in all, got {width} × {height}"
             )
-        self._texels += width * height
         self._bytes += encoded
+        self.spend(width * height, f"this one of {width} × {height}", where)
+
+    def spend(self, texels: int, what: str, where: str) -> None:
+        """Count texels, also of images that are made of decoded ones. Messages call them `what`.
+
+        Raises:
+            SceneFileError: the scene has too many.
+        """
+        self._texels += texels
         most = min(FREE_TEXELS + TEXELS_PER_BYTE * self._bytes, MAX_SCENE_TEXELS)
         if self._texels > most:
             raise SceneFileError(
                 f"{where}: the images of this scene must have at most {most:,} texels together, and with "
-                f"this one of {width} × {height} they have {self._texels:,}"
+                f"{what} they have {self._texels:,}"
             )
 
 

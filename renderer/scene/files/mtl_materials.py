@@ -41,6 +41,8 @@ class _Definition:
     wrap: Wrap = "repeat"
     opacity: float | None = None
     """As `d` says it, or else 1 − `Tr`. None where neither does."""
+    metallic: float = 0.0
+    """As `Pm` says it, in [0, 1]."""
 
 
 @dataclass(frozen=True)
@@ -129,6 +131,12 @@ class MtlMaterials:
                 "1 material is black: its Kd 0 0 0 multiplies its map_Kd",
                 "{n} materials are black: their Kd 0 0 0 multiplies their map_Kd",
             )
+        if definition.metallic > 0.0:
+            self._warnings.tally(
+                "1 material is metallic; its diffuse part is drawn, its reflections are not",
+                "{n} materials are metallic; their diffuse parts are drawn, their reflections are not",
+            )
+            diffuse = diffuse * np.float32(1.0 - definition.metallic)
         self.materials.append(Material(label(name, "default"), diffuse, texture))
         return len(self.materials) - 1
 
@@ -205,6 +213,8 @@ class MtlMaterials:
             definition.opacity = _leading_number(rest.removeprefix("-halo"), 1.0)
         elif keyword == "Tr" and definition.opacity is None:
             definition.opacity = 1.0 - _leading_number(rest, 0.0)
+        elif keyword == "Pm":
+            definition.metallic = min(max(_leading_number(rest, 0.0), 0.0), 1.0)
         elif keyword in ("map_d", "map_Tr"):
             self._warnings.tally(
                 "1 material has an opacity map; it is drawn opaque",

@@ -29,15 +29,6 @@ _DIFFUSE_NAMES = {
 }
 # Materials without a diffuse part; their surfaces are removed.
 _GLASS = ("dielectric", "thindielectric", "roughdielectric", "null")
-# Reflectance of metals at normal incidence, linear Rec. 709.
-_METALS = {
-    "none": (1.0, 1.0, 1.0),
-    "Ag": (0.96, 0.95, 0.92),
-    "Al": (0.91, 0.92, 0.92),
-    "Au": (0.94, 0.78, 0.37),
-    "Cr": (0.55, 0.56, 0.55),
-    "Cu": (0.93, 0.72, 0.50),
-}
 # A choice: side of a checkerboard image in texels. Bilinear filtering blurs its edges by one texel.
 _CHECKER_TEXELS = 64
 
@@ -93,19 +84,15 @@ class MaterialReader:
             return None
         if bsdf.type in ("conductor", "roughconductor"):
             self._warnings.tally(
-                "1 metal is drawn as diffuse, with its reflectance at normal incidence",
-                "{n} metals are drawn as diffuse, with their reflectance at normal incidence",
+                "1 metal is drawn black: its reflections are not drawn",
+                "{n} metals are drawn black: their reflections are not drawn",
             )
-            return self._add(name, self._metal(bsdf), None)
+            return self._add(name, np.zeros(3), None)
         if bsdf.type in ("blendbsdf", "mixturebsdf"):
             return self._blend(bsdf)
         if bsdf.type not in _DIFFUSE_NAMES:
             raise SceneFileError(f"{bsdf.where}: unsupported material type")
-        if bsdf.child("metallic") is not None or _is_metallic(bsdf):
-            self._warnings.tally(
-                "1 principled material is metallic, which is drawn as matt",
-                "{n} principled materials are metallic, which is drawn as matt",
-            )
+        matt = 1.0 - self._metallic(bsdf)
         if bsdf.type not in ("diffuse", "roughdiffuse"):
             self._warnings.tally(
                 "1 material has gloss, which is ignored; its diffuse part is kept",
@@ -114,8 +101,8 @@ class MaterialReader:
         key = _DIFFUSE_NAMES[bsdf.type]
         texture = bsdf.child(key)
         if texture is None or texture.kind != "texture":
-            return self._add(name, bsdf.vector(key, (0.5, 0.5, 0.5)), None)
-        return self._textured(name, texture, np.ones(3))
+            return self._add(name, matt * bsdf.vector(key, (0.5, 0.5, 0.5)), None)
+        return self._textured(name, texture, np.full(3, matt))
 
     def _inner(self, bsdf: Plugin) -> Surfacing | None:
         inner = bsdf.of_kind("bsdf")
@@ -130,16 +117,20 @@ class MaterialReader:
             self._warnings.add(f"{bsdf.type}: bumps and coatings are ignored; the material beneath is used")
         return self.surfacing(inner[0])
 
-    def _metal(self, bsdf: Plugin) -> Float64[np.ndarray, "3"]:
-        tint = bsdf.vector("specular_reflectance", (1.0, 1.0, 1.0))
-        if "eta" in bsdf.values or "k" in bsdf.values:
-            eta, k = bsdf.vector("eta", (0.0, 0.0, 0.0)), bsdf.vector("k", (1.0, 1.0, 1.0))
-            # Fresnel reflectance of a conductor at normal incidence in air.
-            return tint * ((eta - 1.0) ** 2 + k**2) / ((eta + 1.0) ** 2 + k**2)
-        metal = bsdf.text("material", "none")
-        if metal not in _METALS:
-            self._warnings.add(f"metal {label(metal, '?')} is unknown: a grey reflectance of 0.6 is used")
-        return tint * np.array(_METALS.get(metal, (0.6, 0.6, 0.6)))
+    def _metallic(self, bsdf: Plugin) -> float:
+        """Metalness in [0, 1] of a principled material; 0 for all others."""
+        if bsdf.type != "principled":
+            return 0.0
+        if bsdf.child("metallic") is not None:
+            self._warnings.add("principled: a texture of metalness is ignored; the material is drawn matt")
+            return 0.0
+        metallic = min(max(bsdf.number("metallic", 0.0), 0.0), 1.0)
+        if metallic > 0.0:
+            self._warnings.tally(
+                "1 material is metallic; its diffuse part is drawn, its reflections are not",
+                "{n} materials are metallic; their diffuse parts are drawn, their reflections are not",
+            )
+        return metallic
 
     def _blend(self, bsdf: Plugin) -> Surfacing | None:
         inner = bsdf.of_kind("bsdf")
@@ -206,10 +197,6 @@ class MaterialReader:
         color = np.clip(base_color, 0.0, 1.0).astype(np.float32)
         self.materials.append(Material(f"{name} {len(self.materials)}", color, texture))
         return Surfacing(len(self.materials) - 1, np.eye(3) if to_uv is None else to_uv)
-
-
-def _is_metallic(bsdf: Plugin) -> bool:
-    return bsdf.type == "principled" and bsdf.number("metallic", 0.0) > 0.0
 
 
 def _to_uv(texture: Plugin) -> Float64[np.ndarray, "3 3"]:

@@ -3,6 +3,7 @@
 import math
 import time
 
+import numpy as np
 import pytest
 from reading_cost import MITSUBA, check_cost
 
@@ -144,11 +145,22 @@ def test_a_beam_wider_than_its_cutoff_is_refused(tmp_path):
         read(tmp_path, CUBE + spot)
 
 
-@pytest.mark.parametrize(("metallic", "is_said"), [("0", False), ("0.8", True)])
-def test_a_metallic_material_is_said(tmp_path, metallic, is_said):
-    bsdf = f'<bsdf type="principled"><float name="metallic" value="{metallic}"/></bsdf>'
+@pytest.mark.parametrize("metallic", [0.0, 0.75])
+def test_a_metallic_material_has_its_diffuse_part(tmp_path, metallic):
+    bsdf = f'''<bsdf type="principled"><rgb name="base_color" value="0.8 0.4 0.2"/>
+      <float name="metallic" value="{metallic}"/></bsdf>'''
     scene = read(tmp_path, f'<shape type="cube">{bsdf}</shape>')
-    assert ("1 principled material is metallic, which is drawn as matt" in scene.warnings) is is_said
+    said = "1 material is metallic; its diffuse part is drawn, its reflections are not"
+    assert (said in scene.warnings) is (metallic > 0.0)
+    np.testing.assert_allclose(
+        scene.materials[0].base_color, (1.0 - metallic) * np.array([0.8, 0.4, 0.2]), rtol=1e-6
+    )
+
+
+def test_a_conductor_reflects_no_diffuse_light(tmp_path):
+    scene = read(tmp_path, '<shape type="cube"><bsdf type="roughconductor"/></shape>')
+    assert "1 metal is drawn black: its reflections are not drawn" in scene.warnings
+    np.testing.assert_array_equal(scene.materials[0].base_color, 0.0)
 
 
 def test_references_nested_too_deep_are_refused_in_bounded_time(tmp_path):

@@ -7,6 +7,7 @@ import pytest
 from PIL import Image
 
 from vpltune.renderer.errors import InputError
+from vpltune.renderer.files.srgb import linear_from_srgb, srgb_from_linear
 from vpltune.renderer.scene.files import image_texels, read_scene
 
 UV = np.array([[0, 0], [1, 0], [0, 1]], np.float32)
@@ -22,9 +23,8 @@ def texels_of(gltf, image):
 
 def test_factor_is_linear_and_white_where_absent(triangle):
     triangle.add_primitive()
-    triangle.add(
-        "materials", {"name": "ochre", "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 0.125, 0.5]}}
-    )
+    surface = {"baseColorFactor": [0.5, 0.25, 0.125, 0.5], "metallicFactor": 0}
+    triangle.add("materials", {"name": "ochre", "pbrMetallicRoughness": surface})
     triangle.primitive["material"] = 0
     ochre, default = read_scene(triangle.write()).materials
     assert ochre.name == "ochre"
@@ -201,11 +201,7 @@ def test_images_that_no_base_colour_uses_are_not_opened(triangle):
         # The default of metallicFactor is 1 (glTF 2.0 section 3.9.2).
         (
             {"pbrMetallicRoughness": {}},
-            "1 material is metallic; it is drawn matt, in its base colour",
-        ),
-        (
-            {"pbrMetallicRoughness": {"metallicFactor": 0.5, "metallicRoughnessTexture": {"index": 0}}},
-            "1 material is metallic by its texture; it is drawn matt, in its base colour",
+            "1 material is metallic; its diffuse part is drawn, its reflections are not",
         ),
         (
             {"pbrMetallicRoughness": {"metallicFactor": 0, "metallicRoughnessTexture": {"index": 0}}},
@@ -242,8 +238,61 @@ def test_metals_are_counted(triangle):
     for primitive in (triangle.add_primitive(), triangle.primitive):
         primitive["material"] = triangle.add("materials", {"pbrMetallicRoughness": {"metallicFactor": 1}})
     assert read_scene(triangle.write()).warnings == (
-        "2 materials are metallic; they are drawn matt, in their base colours",
+        "2 materials are metallic; their diffuse parts are drawn, their reflections are not",
     )
+
+
+def metallic_image(*blue: int) -> Image.Image:
+    return Image.fromarray(np.array([[[255, 128, b] for b in blue]], np.uint8))
+
+
+def test_a_metal_has_the_diffuse_part_of_its_factor(triangle):
+    surface = {"baseColorFactor": [0.8, 0.4, 0.2, 1.0], "metallicFactor": 0.75}
+    triangle.primitive["material"] = triangle.add("materials", {"pbrMetallicRoughness": surface})
+    # A quarter of the base colour, in float32.
+    np.testing.assert_allclose(
+        read_scene(triangle.write()).materials[0].base_color, [0.2, 0.1, 0.05], rtol=1e-6
+    )
+
+
+@pytest.mark.parametrize("has_color", [True, False])
+def test_a_metal_is_dimmed_texel_by_texel_by_the_blue_channel(triangle, has_color):
+    rgb = np.array([[[200, 100, 50]] * 3], np.uint8)
+    triangle.add_primitive(TEXCOORD_0=UV)
+    triangle.add_base_color_image(Image.fromarray(rgb))
+    color_texture = triangle.document["materials"][0]["pbrMetallicRoughness"].pop("baseColorTexture")
+    triangle.add_base_color_image(metallic_image(0, 255, 51))
+    surface = triangle.document["materials"][1]["pbrMetallicRoughness"]
+    surface |= {"metallicRoughnessTexture": surface.pop("baseColorTexture"), "metallicFactor": 0.5}
+    if has_color:
+        surface["baseColorTexture"] = color_texture
+    (texture,) = read_scene(triangle.write()).textures
+    linear = linear_from_srgb((rgb if has_color else 255 * np.ones_like(rgb)) / 255.0)
+    expected = linear * (1.0 - 0.5 * np.array([0, 255, 51])[None, :, None] / 255.0)
+    # Half a step of the sRGB bytes that the products are kept in.
+    np.testing.assert_allclose(texture.texels_srgb, 255.0 * srgb_from_linear(expected), atol=0.501)
+    np.testing.assert_array_equal(texture.texels_srgb[0, 0], rgb[0, 0] if has_color else [255] * 3)
+
+
+def test_a_metallic_texture_of_one_value_is_a_factor(triangle):
+    triangle.add_base_color_image(metallic_image(51, 51))
+    surface = triangle.document["materials"][0]["pbrMetallicRoughness"]
+    surface |= {"metallicRoughnessTexture": surface.pop("baseColorTexture"), "metallicFactor": 1.0}
+    scene = read_scene(triangle.write())
+    assert scene.textures == ()
+    np.testing.assert_allclose(scene.materials[0].base_color, 0.8, rtol=1e-6)
+
+
+def test_a_metallic_texture_placed_otherwise_counts_by_its_mean(triangle):
+    triangle.add_primitive(TEXCOORD_0=UV)
+    triangle.add_base_color_image(metallic_image(0, 102))
+    surface = triangle.document["materials"][0]["pbrMetallicRoughness"]
+    surface["metallicRoughnessTexture"] = surface["baseColorTexture"] | {"texCoord": 1}
+    surface["metallicFactor"] = 1.0
+    scene = read_scene(triangle.write())
+    # 1 − 51/255.
+    np.testing.assert_allclose(scene.materials[0].base_color, 0.8, rtol=1e-6)
+    assert "1 metallic texture is placed otherwise than the base colour's; its mean counts" in scene.warnings
 
 
 def test_specular_glossiness_gives_its_diffuse_colour(triangle):

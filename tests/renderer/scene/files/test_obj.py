@@ -90,6 +90,13 @@ def test_materials_textures_and_coordinates(tmp_path):
     assert scene.warnings == ()
 
 
+def test_a_metal_has_its_diffuse_part(tmp_path):
+    (tmp_path / "a.mtl").write_text("newmtl a\nKd 0.8 0.4 0.2\nPm 0.75\n")
+    scene = read_text(tmp_path, "mtllib a.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\n")
+    np.testing.assert_allclose(scene.materials[0].base_color, [0.2, 0.1, 0.05], rtol=1e-6)
+    assert scene.warnings == ("1 material is metallic; its diffuse part is drawn, its reflections are not",)
+
+
 def test_missing_textures_and_libraries_are_said(tmp_path):
     (tmp_path / "a.mtl").write_text(
         "newmtl a\nmap_Kd no.png\nnewmtl b\nKd .5 .5 .5\nmap_Kd C:\\gone\\no.png\n"

@@ -42,6 +42,7 @@ class GltfMaterials:
         self._textures = GltfTextures(document, accessors)
         self.materials: list[Material] = []
         self._base_colors: dict[str, BaseColor] = {}
+        self._left_out: set[str] = set()
 
     @property
     def textures(self) -> list[Texture]:
@@ -60,6 +61,22 @@ class GltfMaterials:
         if material.where not in self._base_colors:
             self._base_colors[material.where] = self._read(material)
         return self._base_colors[material.where]
+
+    def is_unlit(self, primitive: JsonObject) -> bool:
+        """Whether a primitive has its colour without any light: KHR_materials_unlit, as of painted skies."""
+        material = self._document.referred(primitive, "material", "materials")
+        return material is not None and material.extension("KHR_materials_unlit") is not None
+
+    def leave_out(self, primitive: JsonObject) -> None:
+        """Say that surfaces with the material of an unlit primitive are left out; once for each material."""
+        material = self._document.referred(primitive, "material", "materials")
+        if material is None or material.where in self._left_out:
+            return
+        self._left_out.add(material.where)
+        self._document.warnings.tally(
+            "1 material is unlit; its surfaces are left out: they cast no shadow and reflect no light",
+            "{n} materials are unlit; their surfaces are left out: they cast no shadow and reflect no light",
+        )
 
     def _read(self, material: JsonObject) -> BaseColor:
         holder, factor_key, texture_key = self._base_color_keys(material)
@@ -114,8 +131,8 @@ class GltfMaterials:
                 )
         if material.extension("KHR_materials_unlit") is not None:
             warnings.tally(
-                "1 material is marked unlit; it is lit like any other",
-                "{n} materials are marked unlit; they are lit like any other",
+                "1 material is unlit, and no other surface is there: it is lit like any other",
+                "{n} materials are unlit, and no other surface is there: they are lit like any other",
             )
 
     def _metalness(self, material: JsonObject, color: JsonObject | None) -> tuple[float, JsonObject | None]:

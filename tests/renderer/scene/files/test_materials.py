@@ -186,7 +186,10 @@ def test_images_that_no_base_colour_uses_are_not_opened(triangle):
     [
         ({"emissiveFactor": [0, 1, 0]}, "1 material emits light; emission does not light the scene yet"),
         ({"alphaMode": "BLEND"}, "1 material has an alpha mode; it is drawn opaque"),
-        ({"extensions": {"KHR_materials_unlit": {}}}, "1 material is marked unlit; it is lit like any other"),
+        (
+            {"extensions": {"KHR_materials_unlit": {}}},
+            "1 material is unlit, and no other surface is there: it is lit like any other",
+        ),
         (
             {"extensions": {"KHR_materials_transmission": {}}},
             "1 material transmits light; it is drawn opaque",
@@ -209,7 +212,7 @@ def test_images_that_no_base_colour_uses_are_not_opened(triangle):
         ),
         (
             {"pbrMetallicRoughness": {}, "extensions": {"KHR_materials_unlit": {}}},
-            "1 material is marked unlit; it is lit like any other",
+            "1 material is unlit, and no other surface is there: it is lit like any other",
         ),
     ],
 )
@@ -217,6 +220,20 @@ def test_what_a_diffuse_model_leaves_out_is_said(triangle, material, warning):
     triangle.add("materials", material)
     triangle.primitive["material"] = 0
     assert read_scene(triangle.write()).warnings == ((warning,) if warning else ())
+
+
+def test_unlit_surfaces_are_left_out_beside_others(triangle):
+    sky = np.array([[0, 0, 9], [9, 0, 9], [0, 9, 9]], np.float32)
+    for _ in range(2):
+        painted = triangle.add("materials", {"extensions": {"KHR_materials_unlit": {}}})
+        triangle.add_primitive(sky)["material"] = painted
+    scene = read_scene(triangle.write())
+    assert len(scene.instances) == len(scene.materials) == 1
+    # The sky does not count for the scene's size either.
+    assert scene.bounds()[1][2] == 0.0
+    assert scene.warnings == (
+        "2 materials are unlit; their surfaces are left out: they cast no shadow and reflect no light",
+    )
 
 
 def test_like_warnings_are_counted(triangle):

@@ -37,6 +37,8 @@ VERSION = 3
 faces, each within the one before, and importance mixes."""
 # What triangles without a texture look up.
 WHITE = Texture("white", np.full((1, 1, 3), 255, np.uint8))
+# A choice: materials that a sentence of `left_out` names.
+_NAMES_SHOWN = 5
 DOCUMENT_NAME, BINARY_NAME = "bundle.json", "bundle.bin"
 
 
@@ -46,6 +48,8 @@ class SceneBundle:
 
     document: dict[str, Any]
     binary: bytes
+    drawn_whole: tuple[str, ...] = ()
+    """Names of the materials with holes, which a bundle has not."""
 
 
 def scene_bundle(scene: Scene, view: View, config: TunedConfig) -> SceneBundle:
@@ -96,7 +100,8 @@ def scene_bundle(scene: Scene, view: View, config: TunedConfig) -> SceneBundle:
         "textures": [_texture(texture, binary) for texture in (*scene.textures, WHITE)],
         "arrays": binary.arrays,
     }
-    return SceneBundle(document, bytes(binary.content))
+    drawn_whole = tuple(material.name for material in scene.materials if not material.is_opaque)
+    return SceneBundle(document, bytes(binary.content), drawn_whole)
 
 
 def _vpl_importance(config: TunedConfig, view: View) -> dict[str, Any]:
@@ -139,9 +144,22 @@ def _visibility_maps(config: TunedConfig) -> dict[str, int]:
     }
 
 
-def left_out(config: TunedConfig, frame_size: tuple[int, int]) -> tuple[str, ...]:
-    """What of a config is not drawn outside the runtime, a sentence each; `frame_size` is in pixels."""
+def left_out(
+    config: TunedConfig, frame_size: tuple[int, int], drawn_whole: tuple[str, ...] = ()
+) -> tuple[str, ...]:
+    """What of a config and its scene is not drawn outside the runtime, a sentence each.
+
+    Args:
+        config: what is drawn with.
+        frame_size: in pixels.
+        drawn_whole: `SceneBundle.drawn_whole`.
+    """
     sentences = []
+    if drawn_whole:
+        names = ", ".join(drawn_whole[:_NAMES_SHOWN]) + (", …" if len(drawn_whole) > _NAMES_SHOWN else "")
+        sentences.append(
+            f"Surfaces with holes are drawn whole here ({names}); only the runtime draws the holes"
+        )
     if config.parameters.screen_space_strength > 0.0 and not config.parameters.vpls_are_discs:
         sentences.append("The screen-space near field is drawn by the runtime alone")
     if config.quality.interleave_for(config.parameters.vpl_count, frame_size) > 1:

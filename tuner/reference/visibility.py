@@ -73,7 +73,7 @@ def _unoccluded(traced: TracedScene, tables: list, pair, count: int) -> Bool[np.
     segment = segment + _offset_in_sight(w, normal, vpl_normal, segment, w.take(radii, vpl))
     facing = w.dot(normal, segment) > 0.0
     facing = facing & (w.dot(vpl_normal, segment) < 0.0)
-    return w.to_numpy(facing & ~w.occluded(origin, segment, 1.0, facing))
+    return w.to_numpy(facing & (traced.surfaces.passing(origin, segment, 1.0, facing) > 0.0))
 
 
 def _offset_in_sight(w, normal, vpl_normal, segment, radius):

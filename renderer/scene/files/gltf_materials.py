@@ -1,6 +1,6 @@
 """glTF materials: base-colour factors and textures. A diffuse material has no use for the rest."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64
@@ -16,6 +16,7 @@ from vpltune.renderer.scene.files.gltf_textures import (
     uv_transform,
 )
 from vpltune.renderer.scene.files.json_object import JsonObject, shown
+from vpltune.renderer.scene.files.opacity import without_idle_alpha
 from vpltune.renderer.scene.scene import Material, Texture
 
 # Extensions in place of metallic-roughness, so that its metallicFactor says nothing.
@@ -80,20 +81,24 @@ class GltfMaterials:
 
     def _read(self, material: JsonObject) -> BaseColor:
         holder, factor_key, texture_key = self._base_color_keys(material)
-        factor = holder.numbers(factor_key, 4, default=(1.0, 1.0, 1.0, 1.0))[:3]
+        factor = holder.numbers(factor_key, 4, default=(1.0, 1.0, 1.0, 1.0))
         # 1e-6 accepts a 1 in single precision, such as 1.0000001.
         if (factor < 0.0).any() or (factor > 1.0 + 1e-6).any():
             raise SceneFileError(f"{holder.at(factor_key)}: must lie in [0, 1], got {shown(factor.tolist())}")
         self._warn_of_ignored(material)
         color = holder.object(texture_key)
         metallic, metal = self._metalness(material, color)
-        layers = Layers(color, metal, metallic)
+        is_masked = material.string("alphaMode", "OPAQUE") == "MASK"
+        layers = Layers(color, metal, metallic, has_alpha=is_masked)
         texture = self._textures.of(layers)
-        if metal is None:
-            factor = factor * (1.0 - metallic)
+        red_green_blue = factor[:3] * (1.0 - metallic) if metal is None else factor[:3]
         name = label(material.string("name", ""), f"material {len(self.materials)}")
-        base_color = np.minimum(factor, 1.0).astype(np.float32)
-        self.materials.append(Material(name, base_color, texture))
+        base_color = np.minimum(red_green_blue, 1.0).astype(np.float32)
+        read = Material(name, base_color, texture)
+        if is_masked:
+            cutoff = material.number("alphaCutoff", 0.5, low=0.0)
+            read = replace(read, alpha_mode="mask", opacity=min(float(factor[3]), 1.0), alpha_cutoff=cutoff)
+        self.materials.append(without_idle_alpha(read, None if texture is None else self.textures[texture]))
         if layers.placed is None or texture is None:
             return BaseColor(len(self.materials) - 1)
         return BaseColor(len(self.materials) - 1, uv_set(layers.placed), uv_transform(layers.placed))
@@ -118,7 +123,7 @@ class GltfMaterials:
                 "1 material emits light; emission does not light the scene yet",
                 "{n} materials emit light; emission does not light the scene yet",
             )
-        if material.string("alphaMode", "OPAQUE") != "OPAQUE":
+        if material.string("alphaMode", "OPAQUE") == "BLEND":
             warnings.tally(
                 "1 material has an alpha mode; it is drawn opaque",
                 "{n} materials have an alpha mode; they are drawn opaque",

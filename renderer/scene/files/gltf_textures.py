@@ -31,6 +31,8 @@ class Layers:
     """A textureInfo of which the blue channel is the metalness; None where none dims the colour."""
     metallic: float = 0.0
     """The factor on that."""
+    has_alpha: bool = False
+    """Whether the colour's alpha counts as opacity."""
 
     @property
     def placed(self) -> JsonObject | None:
@@ -48,6 +50,7 @@ class GltfTextures:
         self.textures: list[Texture] = []
         self._indices: dict[tuple[object, ...], int] = {}
         self._texels: dict[str, UInt8[np.ndarray, "height width _"]] = {}
+        self._opacities: dict[str, UInt8[np.ndarray, "height width"] | None] = {}
 
     def of(self, layers: Layers) -> int | None:
         """The index of a texture; None where it has no image in a supported format.
@@ -68,13 +71,16 @@ class GltfTextures:
         if named is None:
             return None
         wrap_u, wrap_v = self._wraps(self._texture(layers.placed))
-        key = (color and color.where, metal and (metal.where, layers.metallic), wrap_u, wrap_v)
+        opacity = self._opacity(color) if layers.has_alpha and color is not None else None
+        metallic = metal and (metal.where, layers.metallic)
+        key = (color and color.where, metallic, opacity is not None, wrap_u, wrap_v)
         if key not in self._indices:
             self._indices[key] = len(self.textures)
             texels = self._color_texels(color, metal, layers.metallic)
-            self.textures.append(
-                Texture(label(named.string("name", ""), named.where), texels, wrap_u, wrap_v)
-            )
+            if opacity is not None:
+                opacity = of_size(opacity, texels.shape[1], texels.shape[0])
+            name = label(named.string("name", ""), named.where)
+            self.textures.append(Texture(name, texels, wrap_u, wrap_v, opacity))
         return self._indices[key]
 
     def image(self, info: JsonObject) -> JsonObject | None:
@@ -88,14 +94,23 @@ class GltfTextures:
     def texels(self, image: JsonObject) -> UInt8[np.ndarray, "height width _"]:
         """The texels of an image, as the file has them: sRGB-encoded colours, or plain numbers."""
         if image.where not in self._texels:
-            if "uri" in image.members:
-                content: bytes | memoryview = read_uri(self._document, image)
-            else:
-                content = self._buffers.view(image)[0]
-            source = image.string("uri", "")
-            where = image.where if source[:5].lower() in ("", "data:") else f"{image.where} {source!r:.80}"
-            self._texels[image.where] = self._decoder.decode(content, where)
+            self._texels[image.where] = self._decoder.decode(*self._content(image))
         return self._texels[image.where]
+
+    def _opacity(self, image: JsonObject) -> UInt8[np.ndarray, "height width"] | None:
+        if image.where not in self._opacities:
+            self._opacities[image.where] = self._decoder.opacity(*self._content(image))
+        return self._opacities[image.where]
+
+    def _content(self, image: JsonObject) -> tuple[bytes | memoryview, str]:
+        """The bytes of an image file, and its place for messages."""
+        if "uri" in image.members:
+            content: bytes | memoryview = read_uri(self._document, image)
+        else:
+            content = self._buffers.view(image)[0]
+        source = image.string("uri", "")
+        is_named = source[:5].lower() not in ("", "data:")
+        return content, f"{image.where} {source!r:.80}" if is_named else image.where
 
     def _texture(self, info: JsonObject) -> JsonObject:
         textures = self._document.list_of("textures")

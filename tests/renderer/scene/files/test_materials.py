@@ -236,6 +236,49 @@ def test_unlit_surfaces_are_left_out_beside_others(triangle):
     )
 
 
+def masked(gltf, alpha: list[int], **members):
+    """A scene of one triangle whose base colour has these alphas, and its material."""
+    gltf.add_primitive(TEXCOORD_0=UV)
+    gltf.add_base_color_image(Image.fromarray(np.array([[[9, 8, 7, a] for a in alpha]], np.uint8)))
+    gltf.document["materials"][0] |= {"alphaMode": "MASK"} | members
+    scene = read_scene(gltf.write())
+    return scene, scene.materials[0]
+
+
+def test_a_mask_has_its_texture_s_alpha_and_its_cutoff(gltf):
+    scene, material = masked(gltf, [0, 200, 255], alphaCutoff=0.25)
+    assert (material.alpha_mode, material.alpha_cutoff, material.opacity) == ("mask", 0.25, 1.0)
+    np.testing.assert_array_equal(scene.textures[0].opacity, [[0, 200, 255]])
+    np.testing.assert_array_equal(scene.textures[0].texels_srgb, [[[9, 8, 7]] * 3])
+    assert scene.warnings == ()
+
+
+@pytest.mark.parametrize("members", [{"alphaMode": "OPAQUE"}, {"alphaCutoff": 0.1}])
+def test_an_alpha_that_cuts_nothing_is_opaque(gltf, members):
+    _, material = masked(gltf, [30, 255], **members)
+    assert material.is_opaque
+
+
+def test_one_image_serves_opaque_and_masked_materials(gltf):
+    for primitive in (gltf.add_primitive(TEXCOORD_0=UV), gltf.add_primitive(TEXCOORD_0=UV)):
+        primitive["material"] = gltf.add("materials", {})
+    gltf.add_base_color_image(Image.new("RGBA", (1, 1), (9, 8, 7, 0)))
+    surface = gltf.document["materials"].pop()
+    gltf.document["materials"] = [surface, surface | {"alphaMode": "MASK"}]
+    for primitive, material in zip(gltf.document["meshes"][0]["primitives"], (0, 1), strict=True):
+        primitive["material"] = material
+    scene = read_scene(gltf.write())
+    assert [texture.opacity is None for texture in scene.textures] == [True, False]
+    assert [material.is_opaque for material in scene.materials] == [True, False]
+
+
+@pytest.mark.parametrize("cutoff", [-0.1, "half"])
+def test_a_cutoff_out_of_range_is_refused(triangle, cutoff):
+    triangle.primitive["material"] = triangle.add("materials", {"alphaMode": "MASK", "alphaCutoff": cutoff})
+    with pytest.raises(InputError, match=r"materials\[0\]\.alphaCutoff: must be a finite number"):
+        read_scene(triangle.write())
+
+
 def test_like_warnings_are_counted(triangle):
     triangle.add_primitive()["material"] = triangle.add("materials", {"emissiveFactor": [1, 1, 1]})
     triangle.primitive["material"] = triangle.add("materials", {"emissiveFactor": [1, 1, 1]})

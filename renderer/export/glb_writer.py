@@ -61,7 +61,9 @@ class _GlbDocument:
             if material.texture is not None:
                 surface["baseColorTexture"] = {"index": material.texture}
             entry = {"name": material.name, "pbrMetallicRoughness": surface, "doubleSided": True}
-            if material.alpha_mode == "mask":
+            if material.is_blended:
+                entry["alphaMode"] = "BLEND"
+            elif not material.is_opaque:
                 entry |= {"alphaMode": "MASK", "alphaCutoff": material.alpha_cutoff}
             self._append("materials", entry)
         for mesh in scene.meshes:

@@ -26,6 +26,7 @@ from vpltune.renderer.gpu.camera_uniforms import camera_uniforms
 from vpltune.renderer.gpu.render_targets import atlas_columns
 from vpltune.renderer.scene.animation import AnimationPlayer
 from vpltune.renderer.scene.light_faces import LightRecords, face_count, light_records
+from vpltune.renderer.scene.panes import is_pane
 from vpltune.renderer.scene.placed_boxes import placed_boxes
 from vpltune.renderer.scene.scene import Scene, Texture, transform_normals, transform_points
 from vpltune.renderer.scene.sun_faces import SunGrid, nested_face_count
@@ -49,7 +50,7 @@ class SceneBundle:
     document: dict[str, Any]
     binary: bytes
     drawn_whole: tuple[str, ...] = ()
-    """Names of the materials with holes, which a bundle has not."""
+    """Names of the materials that are not opaque, which a bundle has not."""
 
 
 def scene_bundle(scene: Scene, view: View, config: TunedConfig) -> SceneBundle:
@@ -157,9 +158,7 @@ def left_out(
     sentences = []
     if drawn_whole:
         names = ", ".join(drawn_whole[:_NAMES_SHOWN]) + (", …" if len(drawn_whole) > _NAMES_SHOWN else "")
-        sentences.append(
-            f"Surfaces with holes are drawn whole here ({names}); only the runtime draws the holes"
-        )
+        sentences.append(f"See-through surfaces are left out here, or drawn whole if half opaque ({names})")
     if config.parameters.screen_space_strength > 0.0 and not config.parameters.vpls_are_discs:
         sentences.append("The screen-space near field is drawn by the runtime alone")
     if config.quality.interleave_for(config.parameters.vpl_count, frame_size) > 1:
@@ -202,15 +201,17 @@ class _Binary:
 
 
 def _draws(scene: Scene, binary: _Binary) -> list[dict[str, Any]]:
-    """All triangles in world space, those of one texture together; a draw is a run of them."""
+    """All triangles in world space but panes, those of one texture together; a draw is a run of them."""
     white = len(scene.textures)
-    textures = [scene.materials[scene.meshes[i.mesh].material].texture for i in scene.instances]
+    panes = [is_pane(scene, mesh) for mesh in scene.meshes]
+    shown = [instance for instance in scene.instances if not panes[instance.mesh]] or scene.instances
+    textures = [scene.materials[scene.meshes[i.mesh].material].texture for i in shown]
     textures = [white if texture is None else texture for texture in textures]
     order = sorted(range(len(textures)), key=lambda i: textures[i])
     parts: dict[str, list[np.ndarray]] = {name: [] for name in ("positions", "normals", "uv", "base_colors")}
     triangles, draws, first_vertex, first_triangle = [], [], 0, 0
     for index in order:
-        instance = scene.instances[index]
+        instance = shown[index]
         mesh = scene.meshes[instance.mesh]
         parts["positions"].append(transform_points(instance.to_world, mesh.positions))
         parts["normals"].append(transform_normals(instance.to_world, mesh.normals))

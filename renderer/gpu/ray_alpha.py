@@ -14,7 +14,7 @@ _WRAPS: tuple[Wrap, ...] = ("repeat", "mirrored_repeat", "clamp_to_edge")
 _OPAQUE = Texture("opaque", np.full((1, 1, 3), 255, np.uint8), opacity=np.full((1, 1), 255, np.uint8))
 """What materials without a texture look up."""
 _MATERIAL_WORDS = 8
-"""Opacity, cutoff, first texel, width, height, wrap along u and v, and one unused."""
+"""Opacity, cutoff, first texel, width, height, wrap along u and v, and 1 if blended."""
 _COORDINATES = 6
 """Words of a triangle: u and v of its corners."""
 
@@ -62,7 +62,7 @@ class RayAlpha:
                 place += len(texels[-1])
             row[:2] = np.array([material.opacity, material.alpha_cutoff], np.float32).view(np.uint32)
             row[2:5] = placed[material.texture], opacity.shape[1], opacity.shape[0]
-            row[5:7] = _WRAPS.index(texture.wrap_u), _WRAPS.index(texture.wrap_v)
+            row[5:] = _WRAPS.index(texture.wrap_u), _WRAPS.index(texture.wrap_v), material.is_blended
         self.words = np.concatenate([materials.ravel(), *coordinates, *texels]).astype(np.uint32)
 
     @property

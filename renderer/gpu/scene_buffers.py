@@ -97,6 +97,11 @@ class SceneBuffers:
         """Whether a surface is not opaque."""
         return not all(group.is_opaque for group in self.draw_groups)
 
+    @property
+    def has_blended(self) -> bool:
+        """Whether a surface lets a share of the light pass."""
+        return any(self._scene.materials[mesh.material].is_blended for mesh in self._scene.meshes)
+
     def draw(self, program: RasterProgram, vertex_array: moderngl.VertexArray, *, opaque: bool) -> None:
         """Draw all opaque instances, or all others, with a program that is bound.
 
@@ -179,7 +184,7 @@ class SceneBuffers:
             mesh = scene.meshes[instance.mesh]
             material = scene.materials[mesh.material]
             records["base_color"][index, :3] = material.base_color
-            records["alpha"][index, :2] = material.opacity, material.alpha_cutoff
+            records["alpha"][index] = material.opacity, material.alpha_cutoff, material.is_blended, index
             if mesh.skinning is not None and scene.animation is not None:
                 records["skinning"][index] = (
                     self._first_influences[instance.mesh],

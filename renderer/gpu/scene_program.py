@@ -50,8 +50,14 @@ class SceneProgram:
 
 
 def scene_programs(
-    resources: Resources, scene: SceneBuffers, shader: str, reads: Sequence[str] = ()
+    resources: Resources,
+    scene: SceneBuffers,
+    shader: str,
+    reads: Sequence[str] = (),
+    defines: Mapping[str, Define] | None = None,
 ) -> list[SceneProgram]:
     """The programs that draw all of a scene; one alone where every surface is opaque."""
     kinds = (True, False) if scene.has_holes else (True,)
-    return [SceneProgram(resources, scene, shader, opaque=kind, reads=reads) for kind in kinds]
+    return [
+        SceneProgram(resources, scene, shader, opaque=kind, defines=defines, reads=reads) for kind in kinds
+    ]

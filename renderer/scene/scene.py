@@ -1,7 +1,7 @@
 """A scene in plain arrays: meshes, materials, textures, lights and cameras.
 
 The runtime and the reference renderer share this description. Every surface is diffuse and two-sided;
-some have holes. Lengths are in world units.
+some have holes, or let a share of the light pass. Lengths are in world units.
 
 Colours are linear, in the Rec. 709 primaries, unless a name says sRGB.
 """
@@ -15,7 +15,7 @@ from jaxtyping import Float32, Float64, Int32, UInt8
 from vpltune.renderer.scene.scene_animation import Animation, Skinning
 
 Wrap = Literal["repeat", "mirrored_repeat", "clamp_to_edge"]
-AlphaMode = Literal["opaque", "mask"]
+AlphaMode = Literal["opaque", "mask", "blend"]
 LightKind = Literal["spot", "point", "directional"]
 
 
@@ -42,6 +42,8 @@ class Material:
 
     The opacity at a point is `opacity` times the texture's there. With the alpha mode `mask`, the surface is
     where that is at least `alpha_cutoff`, and has holes elsewhere: for the camera, for light and for shadows.
+    With `blend`, it stops this share of the light and lets the rest pass straight through; the camera sees it
+    where that is at least `alpha_cutoff`, and what is behind it elsewhere.
     """
 
     name: str
@@ -57,6 +59,11 @@ class Material:
     def is_opaque(self) -> bool:
         """Whether the surface stops all light, everywhere."""
         return self.alpha_mode == "opaque"
+
+    @property
+    def is_blended(self) -> bool:
+        """Whether the surface stops a share of the light."""
+        return self.alpha_mode == "blend"
 
 
 @dataclass(frozen=True, eq=False)

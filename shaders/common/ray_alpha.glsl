@@ -1,11 +1,16 @@
-// Holes in the surfaces that rays meet.
+// Holes in the surfaces that rays meet, and surfaces that let a share of the rays pass.
 //
-// Provides: `ray_meets_surface`. Needs common/ray_intersection.glsl.
+// Provides: `ray_meets_surface`, `ray_seed`. Needs common/ray_intersection.glsl.
 // Python: renderer/gpu/ray_alpha.py, which lays out the words.
 
 layout(std430, binding = RAY_ALPHA_BINDING) readonly buffer RayAlpha {
     uint ray_alpha[];
 };
+
+#include "common/hash.glsl"
+
+// Which numbers decide at blended surfaces: one for each ray, set before it is cast, and the same in every frame.
+uint ray_seed = 0u;
 
 // The texel below a coordinate. `wrap`: 0 repeat, 1 mirrored, 2 clamped.
 uint ray_texel(float coordinate, uint size, uint wrap) {
@@ -43,11 +48,16 @@ vec2 ray_uv(RayTriangle triangle, uint place, vec3 point) {
 
 // Whether there is a surface, and not a hole, where a ray meets a triangle. `surface` is what the instance says: the
 // word of triangle 0's coordinates, and one more than the word of the material, or 0 where all is opaque.
-bool ray_meets_surface(uvec2 surface, uint index, RayTriangle triangle, SpaceRay ray, float distance_along) {
+bool ray_meets_surface(
+    uvec2 surface, uint instance, uint index, RayTriangle triangle, SpaceRay ray, float distance_along) {
     if (surface.y == 0u) {
         return true;
     }
     uint material = surface.y - 1u;
     vec2 uv = ray_uv(triangle, surface.x + 6u * index, ray.origin + distance_along * ray.direction);
-    return ray_opacity(material, uv) >= uintBitsToFloat(ray_alpha[material + 1u]);
+    float opacity = ray_opacity(material, uv);
+    if (ray_alpha[material + 7u] != 0u) {
+        return unit_number(hashed(index ^ hashed(instance ^ hashed(ray_seed)))) < opacity;
+    }
+    return opacity >= uintBitsToFloat(ray_alpha[material + 1u]);
 }

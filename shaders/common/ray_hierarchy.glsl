@@ -96,7 +96,8 @@ RayHit ray_hit(vec3 origin_world, vec3 direction_world, float longest) {
                 float met = triangle_distance(ray, ray_triangles[i], nearest);
 #ifdef RAYS_MEET_HOLES
                 if (met < nearest
-                    && !ray_meets_surface(ray_instances[instance].root.yz, i, ray_triangles[i], ray, met)) {
+                    && !ray_meets_surface(
+                        ray_instances[instance].root.yz, instance, i, ray_triangles[i], ray, met)) {
                     met = nearest;
                 }
 #endif

@@ -14,7 +14,7 @@ layout(location = 1) out vec4 out_albedo;
 
 void main() {
 #ifdef HAS_ALPHA
-    if (surface_opacity() < alpha.y) {
+    if (!is_seen()) {
         discard;
     }
 #endif

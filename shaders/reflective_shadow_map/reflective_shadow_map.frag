@@ -23,7 +23,7 @@ const float MAX_COSINE_RATIO = 8.0;
 
 void main() {
 #ifdef HAS_ALPHA
-    if (surface_opacity() < alpha.y) {
+    if (!stops_light_of_texel(ivec2(gl_FragCoord.xy))) {
         discard;
     }
 #endif

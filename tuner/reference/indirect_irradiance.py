@@ -72,7 +72,8 @@ class IndirectIrradiance:
         directions = wavefront.vectors(np.tile(directions, (2, 1)))
 
         def see():
-            seen = surfaces.first_along(eye, directions, wavefront.all_true(2 * math.prod(view.size)))
+            lanes = wavefront.all_true(2 * math.prod(view.size))
+            seen = surfaces.first_along(eye, directions, lanes, seen=True)
             return seen, self._lights.irradiance(seen, seen.hit)
 
         self._seen, direct = wavefront.run(see)

@@ -83,6 +83,10 @@ class LlvmWavefront:
         """The vector (x, y, z) in each lane."""
         return mi.Vector3f(x, y, z)
 
+    def bits(self, number: Array) -> Array:
+        """The bits of float32 as uint32."""
+        return dr.reinterpret_array(mi.UInt32, number)
+
     def to_index(self, number: Array) -> Array:
         """Convert float32 to uint32, truncating."""
         return mi.UInt32(number)

@@ -98,6 +98,10 @@ class NumpyWavefront:
         """The vector (x, y, z) in each lane."""
         return np.stack(np.broadcast_arrays(x, y, z))
 
+    def bits(self, number):
+        """The bits of float32 as uint32."""
+        return np.ascontiguousarray(number, np.float32).view(np.uint32)
+
     def to_index(self, number):
         """Convert float32 to uint32, truncating."""
         return np.asarray(number).astype(np.uint32)

@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+from vpltune.tuner.reference.sobol import hashed
 from vpltune.tuner.reference.unit_triangles import WRAP_MODES, UnitTriangles, srgb_decode_table
 
 OFFSET = 2.0**-17
@@ -50,11 +51,16 @@ class Surfaces:
         self._alpha_rows = wavefront.table(triangles.triangle_alphas)
         self._alphas = wavefront.table(triangles.alphas)
 
-    def first_along(self, origin, direction, active) -> Surface:
-        """The first surface along each active ray, with position and `origin` in unit space."""
+    def first_along(self, origin, direction, active, *, seen: bool = False) -> Surface:
+        """The first surface along each active ray, with position and `origin` in unit space.
+
+        Of blended surfaces, the first that stops the ray; or, for a camera's rays (`seen`), that it sees.
+        """
         w = self.wavefront
-        first = self._first_beyond_holes if self._has_holes else w.closest_hit
-        hit, triangle, b1, b2 = first(origin, direction, active)
+        if self._has_holes:
+            hit, triangle, b1, b2 = self._first_beyond_holes(origin, direction, active, seen)
+        else:
+            hit, triangle, b1, b2 = w.closest_hit(origin, direction, active)
         b0 = 1.0 - b1 - b2
         corners = w.take_vector(self._corners, triangle)
 
@@ -87,7 +93,7 @@ class Surfaces:
 
         def pass_one(going, start, left, share):
             met, triangle, b1, b2 = w.closest_hit(start, direction, going, left)
-            share = w.where(met, share * (1.0 - self._stopped(triangle, b1, b2)), share)
+            share = w.where(met, share * (1.0 - self._stopped(triangle, b1, b2)[0]), share)
             start = w.where(met, self._behind(triangle, b1, b2, direction), start)
             left = max_t - w.dot(start - origin, direction) / squared
             return going & met & (share > 0.0) & (left > 0.0), start, left, share
@@ -96,13 +102,17 @@ class Surfaces:
         state = (active & (squared > 0.0), origin + direction * 0.0, nothing + max_t, nothing + 1.0)
         return w.loop(lambda going, *_: going, pass_one, state)[-1]
 
-    def _first_beyond_holes(self, origin, direction, active):
-        """As the wavefront's `closest_hit`, of points where there is no hole."""
+    def _first_beyond_holes(self, origin, direction, active, seen: bool):
+        """As the wavefront's `closest_hit`, of points where there is no hole.
+
+        A blended surface stops a ray with its opacity as the probability.
+        """
         w = self.wavefront
 
         def pass_one(going, start, *_):
             met, triangle, b1, b2 = w.closest_hit(start, direction, going)
-            stops = met & (self._stopped(triangle, b1, b2) > 0.0)
+            share, is_seen = self._stopped(triangle, b1, b2)
+            stops = met & (is_seen if seen else share > self._random(start, direction, triangle))
             start = w.where(met, self._behind(triangle, b1, b2, direction), start)
             return going & met & ~stops, start, stops, triangle, b1, b2
 
@@ -119,15 +129,26 @@ class Surfaces:
         return w.loop(lambda going, *_: going, pass_one, state)[2:]
 
     def _stopped(self, triangle, b1, b2):
-        """Share of the light that a surface stops at a point, in [0, 1]."""
+        """Share of the light in [0, 1] that a surface stops at a point, and whether a camera sees it."""
         w = self.wavefront
         row = w.take(self._alpha_rows, triangle)
         corners = w.take_vector(self._corners, triangle)
         u, v = (self._interpolated_uv(corners, axis, 1.0 - b1 - b2, b1, b2) for axis in range(2))
         texture = w.take(self._texture_rows, triangle)
         texel = self._filtered(texture, u, v, lambda packed: w.to_number(packed >> 24) / 255.0)
-        opacity, cutoff = (w.take(self._alphas, row * 2 + k) for k in range(2))
-        return w.where((row == 0) | (opacity * texel >= cutoff), 1.0, 0.0)
+        opacity, cutoff, blended = (w.take(self._alphas, row * 3 + k) for k in range(3))
+        is_seen = (row == 0) | (opacity * texel >= cutoff)
+        return w.where(blended > 0.0, opacity * texel, w.where(is_seen, 1.0, 0.0)), is_seen
+
+    def _random(self, start, direction, triangle):
+        """A number in [0, 1) for each ray and triangle; rays that differ in a bit have unrelated ones."""
+        w = self.wavefront
+        mixed = triangle
+        for vector in (start, direction):
+            for axis in range(3):
+                # An odd factor, 2³²/φ (Knuth), so that equal bits on two axes do not cancel.
+                mixed = (mixed ^ w.bits(vector[axis])) * 0x9E3779B1
+        return hashed(w, mixed, 0)
 
     def _behind(self, triangle, b1, b2, direction):
         """The start of a ray that goes on through a surface: `OFFSET` beyond it."""

@@ -41,8 +41,8 @@ class UnitTriangles:
     """sRGB bytes, red in the lowest, and opacity in the highest."""
     triangle_alphas: UInt32[np.ndarray, " triangles"]
     """Row of `alphas`. Row 0 is that of opaque materials."""
-    alphas: Float32[np.ndarray, "materials 2"]
-    """Opacity and cutoff."""
+    alphas: Float32[np.ndarray, "materials 3"]
+    """Opacity, cutoff, and 1 if blended."""
 
     @property
     def has_holes(self) -> bool:
@@ -140,10 +140,11 @@ def _texture_row(scene: Scene, mesh: Mesh) -> int:
     return 0 if texture is None else texture + 1
 
 
-def _alphas(scene: Scene, meshes: list[Mesh]) -> tuple[list[int], Float32[np.ndarray, "materials 2"]]:
+def _alphas(scene: Scene, meshes: list[Mesh]) -> tuple[list[int], Float32[np.ndarray, "materials 3"]]:
     """The row of each mesh's material, and the rows: one for all that is opaque, then one for each other."""
     used = sorted({mesh.material for mesh in meshes if not scene.materials[mesh.material].is_opaque})
-    rows = [(1.0, 0.0), *((scene.materials[i].opacity, scene.materials[i].alpha_cutoff) for i in used)]
+    others = [scene.materials[i] for i in used]
+    rows = [(1.0, 0.0, 0.0), *((each.opacity, each.alpha_cutoff, each.is_blended) for each in others)]
     row_of = {material: row for row, material in enumerate(used, start=1)}
     return [row_of.get(mesh.material, 0) for mesh in meshes], np.array(rows, np.float32)
 

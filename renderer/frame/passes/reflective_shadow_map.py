@@ -36,8 +36,5 @@ class ReflectiveShadowMapPass(FramePass):
     def _draw_faces(self, program: SceneProgram) -> None:
         rsm, framebuffer = self._rsm, self._rsm.framebuffer
         for face in range(rsm.face_count):
-            column, row = face % rsm.columns, face // rsm.columns
-            tile = (column * rsm.resolution, row * rsm.resolution, rsm.resolution, rsm.resolution)
-            framebuffer.viewport = tile
-            framebuffer.scissor = tile
+            framebuffer.viewport = framebuffer.scissor = rsm.tile(face)
             program.draw(face_index=face)

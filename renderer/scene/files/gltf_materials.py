@@ -16,8 +16,10 @@ from vpltune.renderer.scene.files.gltf_textures import (
     uv_transform,
 )
 from vpltune.renderer.scene.files.json_object import JsonObject, shown
-from vpltune.renderer.scene.files.opacity import without_idle_alpha
-from vpltune.renderer.scene.scene import Material, Texture
+from vpltune.renderer.scene.files.opacity import say_blended, without_idle_alpha
+from vpltune.renderer.scene.scene import AlphaMode, Material, Texture
+
+_ALPHA_MODES: dict[str, AlphaMode] = {"MASK": "mask", "BLEND": "blend"}
 
 # Extensions in place of metallic-roughness, so that its metallicFactor says nothing.
 _WITHOUT_METAL = ("KHR_materials_pbrSpecularGlossiness", "KHR_materials_unlit")
@@ -88,20 +90,54 @@ class GltfMaterials:
         self._warn_of_ignored(material)
         color = holder.object(texture_key)
         metallic, metal = self._metalness(material, color)
-        is_masked = material.string("alphaMode", "OPAQUE") == "MASK"
-        layers = Layers(color, metal, metallic, has_alpha=is_masked)
+        mode = _ALPHA_MODES.get(material.string("alphaMode", "OPAQUE"), "opaque")
+        layers = Layers(color, metal, metallic, has_alpha=mode != "opaque")
         texture = self._textures.of(layers)
         red_green_blue = factor[:3] * (1.0 - metallic) if metal is None else factor[:3]
         name = label(material.string("name", ""), f"material {len(self.materials)}")
         base_color = np.minimum(red_green_blue, 1.0).astype(np.float32)
-        read = Material(name, base_color, texture)
-        if is_masked:
-            cutoff = material.number("alphaCutoff", 0.5, low=0.0)
-            read = replace(read, alpha_mode="mask", opacity=min(float(factor[3]), 1.0), alpha_cutoff=cutoff)
-        self.materials.append(without_idle_alpha(read, None if texture is None else self.textures[texture]))
+        read = Material(name, base_color, texture, mode)
+        if mode != "opaque":
+            read = replace(read, opacity=min(float(factor[3]), 1.0))
+        if mode == "mask":
+            read = replace(read, alpha_cutoff=material.number("alphaCutoff", 0.5, low=0.0))
+        read = self._transmitting(read, material, color, 1.0 - metallic)
+        read = without_idle_alpha(read, None if texture is None else self.textures[texture])
+        say_blended(read, self._document.warnings)
+        self.materials.append(read)
         if layers.placed is None or texture is None:
             return BaseColor(len(self.materials) - 1)
         return BaseColor(len(self.materials) - 1, uv_set(layers.placed), uv_transform(layers.placed))
+
+    def _transmitting(
+        self, read: Material, material: JsonObject, color: JsonObject | None, matt: float
+    ) -> Material:
+        """The material with KHR_materials_transmission: of the light that its diffuse base would reflect, the
+        share t passes instead, tinted by the base colour. The tint is kept in the mean of the channels alone.
+        """
+        transmission = material.extension("KHR_materials_transmission")
+        share = (
+            0.0 if transmission is None else matt * transmission.number("transmissionFactor", 0.0, 0.0, 1.0)
+        )
+        if transmission is None or share == 0.0:
+            return read
+        info = transmission.object("transmissionTexture")
+        if info is not None:
+            self._document.warnings.tally(
+                "1 transmission texture counts by its mean", "{n} transmission textures count by their means"
+            )
+            share *= self._textures.mean_red(info)
+        tint = read.base_color if color is None else read.base_color * self._textures.mean_color(color)
+        passing = share * float(tint.mean())
+        # What does not pass is reflected, or absorbed by the tint.
+        reflected = (1.0 - share) / (1.0 - passing) if passing < 1.0 else 0.0
+        return replace(
+            read,
+            base_color=read.base_color * np.float32(reflected),
+            alpha_mode="blend",
+            opacity=(1.0 if read.is_opaque else read.opacity) * (1.0 - passing),
+            alpha_cutoff=0.5,
+        )
 
     def _base_color_keys(self, material: JsonObject) -> tuple[JsonObject, str, str]:
         specular = material.extension("KHR_materials_pbrSpecularGlossiness")
@@ -123,17 +159,11 @@ class GltfMaterials:
                 "1 material emits light; emission does not light the scene yet",
                 "{n} materials emit light; emission does not light the scene yet",
             )
-        if material.string("alphaMode", "OPAQUE") == "BLEND":
+        if material.extension("KHR_materials_diffuse_transmission") is not None:
             warnings.tally(
-                "1 material has an alpha mode; it is drawn opaque",
-                "{n} materials have an alpha mode; they are drawn opaque",
+                "1 material transmits light diffusely; it is drawn opaque",
+                "{n} materials transmit light diffusely; they are drawn opaque",
             )
-        for name in ("KHR_materials_transmission", "KHR_materials_diffuse_transmission"):
-            if material.extension(name) is not None:
-                warnings.tally(
-                    "1 material transmits light; it is drawn opaque",
-                    "{n} materials transmit light; they are drawn opaque",
-                )
         if material.extension("KHR_materials_unlit") is not None:
             warnings.tally(
                 "1 material is unlit, and no other surface is there: it is lit like any other",

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float32, Float64, UInt8
 
+from vpltune.renderer.files.srgb import linear_from_srgb
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, label
 from vpltune.renderer.scene.files.gltf_accessors import GltfAccessors
 from vpltune.renderer.scene.files.gltf_buffers import read_uri
@@ -111,6 +112,20 @@ class GltfTextures:
         source = image.string("uri", "")
         is_named = source[:5].lower() not in ("", "data:")
         return content, f"{image.where} {source!r:.80}" if is_named else image.where
+
+    def mean_color(self, info: JsonObject) -> Float64[np.ndarray, "3"]:
+        """Mean linear colour of a texture, over at most 256² of its texels; white without an image."""
+        image = self.image(info)
+        if image is None:
+            return np.ones(3)
+        texels = self.texels(image)
+        rows, columns = (-(-size // 256) for size in texels.shape[:2])
+        return linear_from_srgb(texels[::rows, ::columns] / 255.0).mean(axis=(0, 1))
+
+    def mean_red(self, info: JsonObject) -> float:
+        """Mean of a texture's red channel, taken as a plain number in [0, 1]; 1 without an image."""
+        image = self.image(info)
+        return 1.0 if image is None else float(self.texels(image)[..., 0].mean()) / 255.0
 
     def _texture(self, info: JsonObject) -> JsonObject:
         textures = self._document.list_of("textures")

@@ -1,14 +1,16 @@
 """The diffuse part of Mitsuba's materials."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64, UInt8
 
-from vpltune.renderer.files.srgb import srgb_from_linear
+from vpltune.renderer.files.srgb import linear_from_srgb, srgb_from_linear
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, label
 from vpltune.renderer.scene.files.image_texels import MTL_FORMATS, ImageDecoder
+from vpltune.renderer.scene.files.opacity import say_blended, without_idle_alpha
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
+from vpltune.renderer.scene.files.texel_products import of_size
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
 from vpltune.renderer.scene.scene import Material, Texture, Wrap
 
@@ -109,13 +111,38 @@ class MaterialReader:
         if not inner:
             raise SceneFileError(f"{bsdf.where}: must contain a material")
         if bsdf.type == "mask":
-            self._warnings.tally(
-                "1 cut-out material is drawn opaque: its mask is ignored",
-                "{n} cut-out materials are drawn opaque: their masks are ignored",
-            )
-        elif bsdf.type != "twosided":
+            return self._masked(bsdf, self.surfacing(inner[0]))
+        if bsdf.type != "twosided":
             self._warnings.add(f"{bsdf.type}: bumps and coatings are ignored; the material beneath is used")
         return self.surfacing(inner[0])
+
+    def _masked(self, mask: Plugin, inner: Surfacing | None) -> Surfacing | None:
+        """A material that stops the share `opacity` of the light, a number or the image of a bitmap."""
+        if inner is None:
+            return None
+        material = self.materials[inner.material]
+        texture = None if material.texture is None else self.textures[material.texture]
+        number, to_uv = 1.0, inner.to_uv
+        opacity = mask.child("opacity")
+        if opacity is None or opacity.kind != "texture":
+            number = min(max(float(mask.vector("opacity", (0.5, 0.5, 0.5)).mean()), 0.0), 1.0)
+        elif opacity.type != "bitmap" or (texture is not None and not np.allclose(_to_uv(opacity), to_uv)):
+            self._warnings.add(
+                "mask: an opacity that is no bitmap, or placed otherwise than the colour, is ignored"
+            )
+            return inner
+        else:
+            # `_texels` holds plain numbers encoded too.
+            linear = linear_from_srgb(self._texels(opacity)[..., 0] / 255.0)
+            plane, to_uv = np.round(255.0 * linear).astype(np.uint8), _to_uv(opacity)
+            texture = _with_opacity(texture, plane, self._images, mask.where)
+            self.textures.append(texture)
+        index = None if texture is None else material.texture if number < 1.0 else len(self.textures) - 1
+        masked = replace(material, texture=index, alpha_mode="blend", opacity=number)
+        masked = without_idle_alpha(masked, texture)
+        say_blended(masked, self._warnings)
+        self.materials.append(masked)
+        return Surfacing(len(self.materials) - 1, to_uv)
 
     def _metallic(self, bsdf: Plugin) -> float:
         """Metalness in [0, 1] of a principled material; 0 for all others."""
@@ -197,6 +224,19 @@ class MaterialReader:
         color = np.clip(base_color, 0.0, 1.0).astype(np.float32)
         self.materials.append(Material(f"{name} {len(self.materials)}", color, texture))
         return Surfacing(len(self.materials) - 1, np.eye(3) if to_uv is None else to_uv)
+
+
+def _with_opacity(
+    texture: Texture | None, plane: UInt8[np.ndarray, "height width"], images: ImageDecoder, where: str
+) -> Texture:
+    """The texture, or white, with an opacity; both in the larger size of the two."""
+    sizes = [plane.shape] if texture is None else [plane.shape, texture.texels_srgb.shape[:2]]
+    height, width = np.max(sizes, axis=0).tolist()
+    images.spend(width * height, f"its texels of {width} × {height}", where)
+    opacity = of_size(plane, width, height)
+    if texture is None:
+        return Texture("mask", np.full((height, width, 3), 255, np.uint8), opacity=opacity)
+    return replace(texture, texels_srgb=of_size(texture.texels_srgb, width, height), opacity=opacity)
 
 
 def _to_uv(texture: Plugin) -> Float64[np.ndarray, "3 3"]:

@@ -5,6 +5,7 @@ import time
 
 import numpy as np
 import pytest
+from PIL import Image
 from reading_cost import MITSUBA, check_cost
 
 from vpltune.renderer.errors import InputError
@@ -155,6 +156,26 @@ def test_a_metallic_material_has_its_diffuse_part(tmp_path, metallic):
     np.testing.assert_allclose(
         scene.materials[0].base_color, (1.0 - metallic) * np.array([0.8, 0.4, 0.2]), rtol=1e-6
     )
+
+
+def test_a_mask_stops_its_share(tmp_path):
+    inner = '<bsdf type="diffuse"><rgb name="reflectance" value="0.25"/></bsdf>'
+    bsdf = f'<bsdf type="mask"><float name="opacity" value="0.75"/>{inner}</bsdf>'
+    scene = read(tmp_path, f'<shape type="cube">{bsdf}</shape>')
+    material = scene.materials[scene.meshes[0].material]
+    assert (material.alpha_mode, material.opacity) == ("blend", 0.75)
+    np.testing.assert_array_equal(material.base_color, 0.25)
+
+
+def test_a_mask_may_be_an_image(tmp_path):
+    Image.fromarray(np.array([[0, 51, 255]], np.uint8)).save(tmp_path / "m.png")
+    image = """<texture name="opacity" type="bitmap"><string name="filename" value="m.png"/>
+      <boolean name="raw" value="true"/></texture>"""
+    bsdf = f'<bsdf type="mask">{image}<bsdf type="diffuse"/></bsdf>'
+    scene = read(tmp_path, f'<shape type="cube">{bsdf}</shape>')
+    material = scene.materials[scene.meshes[0].material]
+    np.testing.assert_array_equal(scene.textures[material.texture].opacity, [[0, 51, 255]])
+    assert (material.alpha_mode, material.opacity) == ("blend", 1.0)
 
 
 def test_a_conductor_reflects_no_diffuse_light(tmp_path):

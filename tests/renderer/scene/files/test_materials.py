@@ -185,14 +185,21 @@ def test_images_that_no_base_colour_uses_are_not_opened(triangle):
     ("material", "warning"),
     [
         ({"emissiveFactor": [0, 1, 0]}, "1 material emits light; emission does not light the scene yet"),
-        ({"alphaMode": "BLEND"}, "1 material has an alpha mode; it is drawn opaque"),
+        ({"alphaMode": "BLEND"}, None),
+        (
+            {
+                "alphaMode": "BLEND",
+                "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.5], "metallicFactor": 0},
+            },
+            "1 material is see-through: light passes by its share, the camera sees it if half opaque or more",
+        ),
         (
             {"extensions": {"KHR_materials_unlit": {}}},
             "1 material is unlit, and no other surface is there: it is lit like any other",
         ),
         (
-            {"extensions": {"KHR_materials_transmission": {}}},
-            "1 material transmits light; it is drawn opaque",
+            {"extensions": {"KHR_materials_diffuse_transmission": {}}},
+            "1 material transmits light diffusely; it is drawn opaque",
         ),
         (
             {
@@ -277,6 +284,42 @@ def test_a_cutoff_out_of_range_is_refused(triangle, cutoff):
     triangle.primitive["material"] = triangle.add("materials", {"alphaMode": "MASK", "alphaCutoff": cutoff})
     with pytest.raises(InputError, match=r"materials\[0\]\.alphaCutoff: must be a finite number"):
         read_scene(triangle.write())
+
+
+def test_a_blended_material_has_its_factor_and_its_texture_s_alpha(gltf):
+    gltf.add_primitive(TEXCOORD_0=UV)
+    gltf.add_base_color_image(Image.new("RGBA", (1, 1), (9, 8, 7, 51)))
+    material = gltf.document["materials"][0] | {"alphaMode": "BLEND"}
+    material["pbrMetallicRoughness"]["baseColorFactor"] = [1, 1, 1, 0.5]
+    gltf.document["materials"][0] = material
+    scene = read_scene(gltf.write())
+    assert (scene.materials[0].alpha_mode, scene.materials[0].opacity) == ("blend", 0.5)
+    np.testing.assert_array_equal(scene.textures[0].opacity, [[51]])
+
+
+@pytest.mark.parametrize(
+    ("factor", "metallic", "opacity", "color"),
+    [
+        # All of the white light passes; nothing is left to reflect.
+        (1.0, 0.0, 0.0, [0, 0, 0]),
+        # A tint of 1, ½, 0 passes a half; a quarter of it is transmitted, and three quarters reflected.
+        (0.25, 0.0, 0.875, [0.75 / 0.875, 0.375 / 0.875, 0.0]),
+        # Half of it is metal, which neither transmits nor reflects diffusely.
+        (0.5, 0.5, 1.0 - 0.25 * 0.25, [0.5 * 0.75 / 0.9375, 0.25 * 0.75 / 0.9375, 0.0]),
+        (0.0, 0.0, 1.0, [1.0, 0.5, 0.0]),
+    ],
+)
+def test_transmission_passes_the_tinted_share(triangle, factor, metallic, opacity, color):
+    tint = [1.0, 1.0, 1.0, 1.0] if factor == 1.0 else [1.0, 0.5, 0.0, 1.0]
+    transmission = {"KHR_materials_transmission": {"transmissionFactor": factor}}
+    surface = {"baseColorFactor": tint, "metallicFactor": metallic}
+    triangle.add("materials", {"pbrMetallicRoughness": surface, "extensions": transmission})
+    triangle.primitive["material"] = 0
+    (material,) = read_scene(triangle.write()).materials
+    assert material.is_opaque is (factor == 0.0)
+    assert material.opacity == pytest.approx(opacity)
+    # float32.
+    np.testing.assert_allclose(material.base_color, color, rtol=1e-6)
 
 
 def test_like_warnings_are_counted(triangle):

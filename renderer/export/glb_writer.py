@@ -28,7 +28,8 @@ def write_glb(path: Path, scene: Scene, *, notes: tuple[str, ...] = ()) -> None:
     """Write `scene` to `path`, whole or not at all; `notes` go into the asset's extras.
 
     Positions, texture coordinates and colours keep their float32 bits, textures their texels (as PNG), and
-    transforms their float64 digits. Materials become matt and two-sided, which is what ours are.
+    transforms their float64 digits. Materials become matt and two-sided, which is what ours are, with their
+    alpha.
 
     Raises:
         InputError: the path cannot be written to.
@@ -54,14 +55,17 @@ class _GlbDocument:
             self._add_texture(texture)
         for material in scene.materials:
             surface: dict[str, Any] = {
-                "baseColorFactor": [float(channel) for channel in material.base_color] + [1.0],
+                "baseColorFactor": [*(float(channel) for channel in material.base_color), material.opacity],
                 "metallicFactor": 0.0,
             }
             if material.texture is not None:
                 surface["baseColorTexture"] = {"index": material.texture}
-            self._append(
-                "materials", {"name": material.name, "pbrMetallicRoughness": surface, "doubleSided": True}
-            )
+            entry = {"name": material.name, "pbrMetallicRoughness": surface, "doubleSided": True}
+            if material.is_blended:
+                entry["alphaMode"] = "BLEND"
+            elif not material.is_opaque:
+                entry |= {"alphaMode": "MASK", "alphaCutoff": material.alpha_cutoff}
+            self._append("materials", entry)
         for mesh in scene.meshes:
             self._add_mesh(mesh)
         for instance in scene.instances:
@@ -130,7 +134,10 @@ class _GlbDocument:
 
     def _add_texture(self, texture: Texture) -> None:
         png = io.BytesIO()
-        Image.fromarray(texture.texels_srgb, "RGB").save(png, "PNG")
+        texels = texture.texels_srgb
+        if texture.opacity is not None:
+            texels = np.concatenate([texels, texture.opacity[..., None]], axis=2)
+        Image.fromarray(texels).save(png, "PNG")
         view = self._buffer_view(png.getvalue())
         image = self._append("images", {"name": texture.name, "mimeType": "image/png", "bufferView": view})
         sampler = self._append(

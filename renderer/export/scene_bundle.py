@@ -26,6 +26,7 @@ from vpltune.renderer.gpu.camera_uniforms import camera_uniforms
 from vpltune.renderer.gpu.render_targets import atlas_columns
 from vpltune.renderer.scene.animation import AnimationPlayer
 from vpltune.renderer.scene.light_faces import LightRecords, face_count, light_records
+from vpltune.renderer.scene.panes import is_pane
 from vpltune.renderer.scene.placed_boxes import placed_boxes
 from vpltune.renderer.scene.scene import Scene, Texture, transform_normals, transform_points
 from vpltune.renderer.scene.sun_faces import SunGrid, nested_face_count
@@ -37,6 +38,8 @@ VERSION = 3
 faces, each within the one before, and importance mixes."""
 # What triangles without a texture look up.
 WHITE = Texture("white", np.full((1, 1, 3), 255, np.uint8))
+# A choice: materials that a sentence of `left_out` names.
+_NAMES_SHOWN = 5
 DOCUMENT_NAME, BINARY_NAME = "bundle.json", "bundle.bin"
 
 
@@ -46,6 +49,8 @@ class SceneBundle:
 
     document: dict[str, Any]
     binary: bytes
+    drawn_whole: tuple[str, ...] = ()
+    """Names of the materials that are not opaque, which a bundle has not."""
 
 
 def scene_bundle(scene: Scene, view: View, config: TunedConfig) -> SceneBundle:
@@ -96,7 +101,8 @@ def scene_bundle(scene: Scene, view: View, config: TunedConfig) -> SceneBundle:
         "textures": [_texture(texture, binary) for texture in (*scene.textures, WHITE)],
         "arrays": binary.arrays,
     }
-    return SceneBundle(document, bytes(binary.content))
+    drawn_whole = tuple(material.name for material in scene.materials if not material.is_opaque)
+    return SceneBundle(document, bytes(binary.content), drawn_whole)
 
 
 def _vpl_importance(config: TunedConfig, view: View) -> dict[str, Any]:
@@ -139,9 +145,20 @@ def _visibility_maps(config: TunedConfig) -> dict[str, int]:
     }
 
 
-def left_out(config: TunedConfig, frame_size: tuple[int, int]) -> tuple[str, ...]:
-    """What of a config is not drawn outside the runtime, a sentence each; `frame_size` is in pixels."""
+def left_out(
+    config: TunedConfig, frame_size: tuple[int, int], drawn_whole: tuple[str, ...] = ()
+) -> tuple[str, ...]:
+    """What of a config and its scene is not drawn outside the runtime, a sentence each.
+
+    Args:
+        config: what is drawn with.
+        frame_size: in pixels.
+        drawn_whole: `SceneBundle.drawn_whole`.
+    """
     sentences = []
+    if drawn_whole:
+        names = ", ".join(drawn_whole[:_NAMES_SHOWN]) + (", …" if len(drawn_whole) > _NAMES_SHOWN else "")
+        sentences.append(f"See-through surfaces are left out here, or drawn whole if half opaque ({names})")
     if config.parameters.screen_space_strength > 0.0 and not config.parameters.vpls_are_discs:
         sentences.append("The screen-space near field is drawn by the runtime alone")
     if config.quality.interleave_for(config.parameters.vpl_count, frame_size) > 1:
@@ -186,15 +203,17 @@ class _Binary:
 
 
 def _draws(scene: Scene, binary: _Binary) -> list[dict[str, Any]]:
-    """All triangles in world space, those of one texture together; a draw is a run of them."""
+    """All triangles in world space but panes, those of one texture together; a draw is a run of them."""
     white = len(scene.textures)
-    textures = [scene.materials[scene.meshes[i.mesh].material].texture for i in scene.instances]
+    panes = [is_pane(scene, mesh) for mesh in scene.meshes]
+    shown = [instance for instance in scene.instances if not panes[instance.mesh]] or scene.instances
+    textures = [scene.materials[scene.meshes[i.mesh].material].texture for i in shown]
     textures = [white if texture is None else texture for texture in textures]
     order = sorted(range(len(textures)), key=lambda i: textures[i])
     parts: dict[str, list[np.ndarray]] = {name: [] for name in ("positions", "normals", "uv", "base_colors")}
     triangles, draws, first_vertex, first_triangle = [], [], 0, 0
     for index in order:
-        instance = scene.instances[index]
+        instance = shown[index]
         mesh = scene.meshes[instance.mesh]
         parts["positions"].append(transform_points(instance.to_world, mesh.positions))
         parts["normals"].append(transform_normals(instance.to_world, mesh.normals))

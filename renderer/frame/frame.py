@@ -18,6 +18,7 @@ from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
 from vpltune.renderer.frame.frame_timing import PassClock
 from vpltune.renderer.frame.light_pre_pass import LightPrePass
 from vpltune.renderer.frame.passes.auto_parameters import AutoParametersPass
+from vpltune.renderer.frame.passes.blended_shadow import SHADOW_READS, BlendedShadowPass
 from vpltune.renderer.frame.passes.clustered_discs import ClusteredDiscsPass
 from vpltune.renderer.frame.passes.direct_light import DirectLightPass
 from vpltune.renderer.frame.passes.geometry import GeometryPass
@@ -113,9 +114,12 @@ class Frame:
             ReflectiveShadowMapPass(resources, scene, rsm),
             VplImportancePass(resources, rsm, cells),
             VplDensityPass(resources, rsm, cells),
-            DirectLightPass(resources, rsm),
         ]
         """What camera and lights see, direct light, and the density of VPLs."""
+        shadow_reads = SHADOW_READS if scene.has_blended else ()
+        if scene.has_blended:
+            self._seen.append(BlendedShadowPass(resources, scene, rsm))
+        self._seen.append(DirectLightPass(resources, rsm, shadow_reads))
         self._placed: list[FramePass] = [
             VirtualPointLightsPass(
                 resources, rsm, setup.vpl_count, options.point_table, options.rsm_filtering, cells

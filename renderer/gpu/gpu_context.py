@@ -22,6 +22,7 @@ _GL_DEPTH_COMPONENT32F = 0x8CAC
 _GL_FLOAT = 0x1406
 
 GL_SRGB8 = 0x8C41  # as above
+GL_SRGB8_ALPHA8 = 0x8C43  # as above
 
 
 def create_context() -> moderngl.Context:

@@ -20,8 +20,10 @@ from vpltune.renderer.gpu.bounding_volumes import (
     build_bounding_volumes,
 )
 from vpltune.renderer.gpu.gpu_context import check_errors
+from vpltune.renderer.gpu.ray_alpha import RayAlpha
 from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
+from vpltune.renderer.gpu.shader_library import Define
 from vpltune.renderer.scene.scene import Mesh, Scene
 
 # Levels of a mesh's tree, and of the tree over instances; deeper parts become larger leaves. Choices, which
@@ -35,7 +37,7 @@ RAY_DEFINES = {
 }
 """What a shader that includes `common/ray_hierarchy.glsl` is compiled with."""
 RAY_READS = ("ray_nodes", "ray_triangles", "ray_instances")
-"""And what its program declares."""
+"""And what its program declares. Both are those of a scene whose surfaces are all opaque."""
 
 _TRIANGLE_DTYPE = np.dtype([(corner, "f4", 4) for corner in "abc"])
 _INSTANCE_DTYPE = np.dtype([("world_to_instance", "f4", (3, 4)), ("root", "u4", 4)])
@@ -53,6 +55,8 @@ class _Placed:
     trees: list[BoundingVolumes]
     triangles: list[np.ndarray]
     """Corners [triangles, 3, 3] of each tree, in leaf order."""
+    surfaces: list[tuple[int, np.ndarray]]
+    """Mesh of each tree, and which of its triangles, in leaf order."""
     instances: list[tuple[int, int]]
     """Tree and matrix row of each."""
 
@@ -61,13 +65,13 @@ class RayHierarchy:
     """The buffers behind `ray_hit` of shaders/common/ray_hierarchy.glsl.
 
     Takes 48 bytes for each triangle of a mesh and 33 to 61 for the boxes around it (64 for each pair of
-    nodes), however often the mesh is placed; and 128 for each instance. Building takes about 1 µs for each
-    triangle.
+    nodes), however often the mesh is placed; and 128 for each instance. A triangle with holes takes 24 more,
+    and a texel of its texture one. Building takes about 1 µs for each triangle.
 
     Example:
         >>> rays = RayHierarchy(context, scene, scene_buffers)
         >>> rays.add_to(resources)
-        >>> program = ComputeProgram(resources, "rays", RAY_DEFINES, reads=RAY_READS)
+        >>> program = ComputeProgram(resources, "rays", rays.defines, reads=rays.reads)
         >>> rays.update()  # after scene_buffers.set_pose
 
     Raises:
@@ -80,6 +84,7 @@ class RayHierarchy:
         self._rows = np.array([row for _, row in placed.instances], np.int64)
         self._first_mesh_node = 2 * max(1, len(placed.instances) - 1)
         roots, nodes, triangles = self._joined(placed)
+        alpha = RayAlpha(scene, placed.surfaces)
         of_instance = np.array([tree for tree, _ in placed.instances], np.int64)
         boxes = np.array([[tree.low, tree.high] for tree in placed.trees], np.float64).reshape(-1, 2, 3)
         self._centers = boxes.mean(axis=1)[of_instance]
@@ -88,6 +93,10 @@ class RayHierarchy:
         self._records["root"][: len(of_instance), 0] = roots[of_instance]
         self._nodes = context.buffer(nodes)
         self._triangles = context.buffer(triangles)
+        self._alpha: moderngl.Buffer | None = None
+        if alpha.is_needed:
+            self._records["root"][: len(of_instance), 1:3] = alpha.of_trees[of_instance]
+            self._alpha = context.buffer(alpha.words)
         self._instances = context.buffer(reserve=self._records.nbytes)
         self._placed: np.ndarray | None = None
         self.update()
@@ -109,8 +118,20 @@ class RayHierarchy:
         self._instances.write(self._records)
         self._nodes.write(self._top_nodes(to_world, np.flatnonzero(is_seen)))
 
+    @property
+    def defines(self) -> dict[str, Define]:
+        """What a shader that includes `common/ray_hierarchy.glsl` is compiled with, for this scene."""
+        return dict(RAY_DEFINES) if self._alpha is None else {**RAY_DEFINES, "RAYS_MEET_HOLES": 1}
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """And what its program declares."""
+        return RAY_READS if self._alpha is None else (*RAY_READS, "ray_alpha")
+
     def add_to(self, resources: Resources) -> None:
-        """Make this the scene that rays of programs with `RAY_READS` meet."""
+        """Make this the scene that rays of programs with `reads` meet."""
+        if self._alpha is not None:
+            resources["ray_alpha"] = self._alpha
         resources["ray_nodes"] = self._nodes
         resources["ray_triangles"] = self._triangles
         resources["ray_instances"] = self._instances
@@ -161,7 +182,7 @@ def _moved(child: np.ndarray, first_node: int, first_item: int) -> np.ndarray:
 
 
 def _placed_trees(scene: Scene) -> _Placed:
-    placed = _Placed([], [], [])
+    placed = _Placed([], [], [], [])
     skins = () if scene.animation is None else scene.animation.skins
     first_joints = len(scene.instances) + np.cumsum([0] + [len(skin.joints) for skin in skins])
     pieces: dict[int, list[tuple[int, int]]] = {}
@@ -169,7 +190,9 @@ def _placed_trees(scene: Scene) -> _Placed:
         mesh = scene.meshes[instance.mesh]
         if instance.mesh not in pieces:
             pieces[instance.mesh] = [
-                (joint, _add_tree(placed, corners)) for joint, corners in _rigid_pieces(mesh) if len(corners)
+                (joint, _add_tree(placed, corners, instance.mesh, own))
+                for joint, corners, own in _rigid_pieces(mesh)
+                if len(corners)
             ]
         first = index
         if mesh.skinning is not None and scene.animation is not None:
@@ -178,22 +201,33 @@ def _placed_trees(scene: Scene) -> _Placed:
     return placed
 
 
-def _rigid_pieces(mesh: Mesh) -> list[tuple[int, Float32[np.ndarray, "triangles 3 3"]]]:
-    """The corners of triangles that move as one, each with its joint (0 where there is no skin)."""
+def _rigid_pieces(
+    mesh: Mesh,
+) -> list[tuple[int, Float32[np.ndarray, "triangles 3 3"], Int64[np.ndarray, " triangles"]]]:
+    """What moves as one: its joint (0 where there is no skin), corners, and which of the mesh's triangles."""
     if mesh.skinning is None:
-        return [(0, mesh.positions[mesh.triangles])]
+        return [(0, mesh.positions[mesh.triangles], np.arange(len(mesh.triangles)))]
     joints = mesh.skinning.joints[mesh.triangles].reshape(len(mesh.triangles), -1)
     weights = mesh.skinning.weights[mesh.triangles].reshape(len(mesh.triangles), -1)
     shares = ((joints[:, :, None] == joints[:, None, :]) * weights[:, None, :]).sum(axis=2)
     heaviest = np.take_along_axis(joints, shares.argmax(axis=1)[:, None], axis=1)[:, 0]
     corners = mesh.skinning.bind_positions[mesh.triangles]
-    return [(int(joint), corners[heaviest == joint]) for joint in np.unique(heaviest)]
+    return [
+        (int(joint), corners[heaviest == joint], np.flatnonzero(heaviest == joint))
+        for joint in np.unique(heaviest)
+    ]
 
 
-def _add_tree(placed: _Placed, corners: Float32[np.ndarray, "triangles 3 3"]) -> int:
+def _add_tree(
+    placed: _Placed,
+    corners: Float32[np.ndarray, "triangles 3 3"],
+    mesh: int,
+    own: Int64[np.ndarray, " triangles"],
+) -> int:
     tree = build_bounding_volumes(corners.min(axis=1), corners.max(axis=1), LEAF_ITEMS, _MESH_DEPTH)
     placed.trees.append(tree)
     placed.triangles.append(corners[tree.order])
+    placed.surfaces.append((mesh, own[tree.order]))
     return len(placed.trees) - 1
 
 

@@ -49,6 +49,11 @@ class ReflectiveShadowMap:
         """Height of the atlas in texels."""
         return self.depth.height
 
+    def tile(self, face: int) -> tuple[int, int, int, int]:
+        """Left, bottom, width and height of a face's tile in texels."""
+        left, bottom = face % self.columns * self.resolution, face // self.columns * self.resolution
+        return left, bottom, self.resolution, self.resolution
+
     @property
     def uniforms(self) -> dict[str, object]:
         """What shaders that include `common/rsm.glsl` need to know beside the textures."""

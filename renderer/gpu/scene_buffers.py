@@ -7,13 +7,13 @@ import moderngl
 import numpy as np
 from jaxtyping import Float64
 
-from vpltune.renderer.gpu.gpu_context import GL_SRGB8, check_errors
+from vpltune.renderer.gpu.gpu_context import GL_SRGB8, GL_SRGB8_ALPHA8, check_errors
 from vpltune.renderer.gpu.gpu_program import RasterProgram
 from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.gpu.shader_library import set_uniforms
 from vpltune.renderer.scene.animation import AnimationPlayer
 from vpltune.renderer.scene.placed_boxes import placed_boxes
-from vpltune.renderer.scene.scene import Mesh, Scene, Texture
+from vpltune.renderer.scene.scene import Material, Mesh, Scene, Texture
 
 _VERTEX_LAYOUT = "3f 3f 2f 3f"
 _VERTEX_ATTRIBUTES = ("in_position", "in_normal", "in_uv", "in_color")
@@ -23,6 +23,7 @@ _INSTANCE_DTYPE = np.dtype(
         ("normal_to_world", "f4", (4, 4)),
         ("base_color", "f4", 4),
         ("skinning", "i4", 4),
+        ("alpha", "f4", 4),
     ]
 )
 _INFLUENCE_DTYPE = np.dtype([("joint", "i4"), ("weight", "f4")])
@@ -38,12 +39,13 @@ SCENE_READS = ("scene_instances", "skin_influences", "joint_matrices", "base_col
 
 @dataclass(frozen=True)
 class DrawGroup:
-    """A run of indirect draw commands that share one texture."""
+    """A run of indirect draw commands that share one texture, all opaque or all not."""
 
     texture: moderngl.Texture
     mirrored: tuple[int, int]
     first: int
     count: int
+    is_opaque: bool
 
 
 class SceneBuffers:
@@ -90,10 +92,25 @@ class SceneBuffers:
         ]
         return self._context.vertex_array(program, content, index_buffer=self._indices, index_element_size=4)
 
-    def draw(self, program: RasterProgram, vertex_array: moderngl.VertexArray) -> None:
-        """Draw every instance with a program that is bound: one multi-draw for each texture."""
+    @property
+    def has_holes(self) -> bool:
+        """Whether a surface is not opaque."""
+        return not all(group.is_opaque for group in self.draw_groups)
+
+    @property
+    def has_blended(self) -> bool:
+        """Whether a surface lets a share of the light pass."""
+        return any(self._scene.materials[mesh.material].is_blended for mesh in self._scene.meshes)
+
+    def draw(self, program: RasterProgram, vertex_array: moderngl.VertexArray, *, opaque: bool) -> None:
+        """Draw all opaque instances, or all others, with a program that is bound.
+
+        Takes one multi-draw for each texture.
+        """
         unit = program.unit("base_color_texture")
         for group in self.draw_groups:
+            if group.is_opaque != opaque:
+                continue
             group.texture.use(unit)
             set_uniforms(program.program, mirrored=group.mirrored)
             vertex_array.render_indirect(self._commands, moderngl.TRIANGLES, group.count, group.first)
@@ -135,9 +152,10 @@ class SceneBuffers:
         scene = self._scene
         vertex_starts = np.cumsum([0] + [len(mesh.positions) for mesh in scene.meshes])
         index_starts = np.cumsum([0] + [mesh.triangles.size for mesh in scene.meshes])
-        texture_of = [scene.materials[scene.meshes[i.mesh].material].texture for i in scene.instances]
-        # Instances without a texture come first.
-        order = sorted(range(len(texture_of)), key=lambda i: (texture_of[i] is not None, texture_of[i] or 0))
+        materials = [scene.materials[scene.meshes[i.mesh].material] for i in scene.instances]
+        # Opaque instances come first; of those, the ones without a texture.
+        kinds = [(not m.is_opaque, m.texture is not None, m.texture or 0) for m in materials]
+        order = sorted(range(len(kinds)), key=kinds.__getitem__)
         commands = np.zeros(len(order), _COMMAND_DTYPE)
         groups: list[DrawGroup] = []
         for position, i in enumerate(order):
@@ -145,20 +163,17 @@ class SceneBuffers:
             commands[position] = (
                 scene.meshes[mesh].triangles.size, 1, index_starts[mesh], vertex_starts[mesh], i
             )  # fmt: skip
-            if position == 0 or texture_of[i] != texture_of[order[position - 1]]:
-                groups.append(self._group(texture_of[i], position, order, texture_of))
+            if position == 0 or kinds[i] != kinds[order[position - 1]]:
+                groups.append(self._group(materials[i], position, kinds.count(kinds[i])))
         self._commands = self._context.buffer(commands.tobytes())
         return groups
 
-    def _group(
-        self, texture: int | None, first: int, order: list[int], texture_of: list[int | None]
-    ) -> DrawGroup:
-        count = sum(texture_of[i] == texture for i in order)
-        if texture is None:
-            return DrawGroup(self._white, (0, 0), first, count)
-        source = self._scene.textures[texture]
+    def _group(self, material: Material, first: int, count: int) -> DrawGroup:
+        if material.texture is None:
+            return DrawGroup(self._white, (0, 0), first, count, material.is_opaque)
+        source = self._scene.textures[material.texture]
         mirrored = (int(source.wrap_u == "mirrored_repeat"), int(source.wrap_v == "mirrored_repeat"))
-        return DrawGroup(self._textures[texture], mirrored, first, count)
+        return DrawGroup(self._textures[material.texture], mirrored, first, count, material.is_opaque)
 
     def _instance_records(self) -> np.ndarray:
         """Everything about instances but where they are."""
@@ -167,7 +182,9 @@ class SceneBuffers:
         vertex_starts = np.cumsum([0] + [len(mesh.positions) for mesh in scene.meshes])
         for index, instance in enumerate(scene.instances):
             mesh = scene.meshes[instance.mesh]
-            records["base_color"][index, :3] = scene.materials[mesh.material].base_color
+            material = scene.materials[mesh.material]
+            records["base_color"][index, :3] = material.base_color
+            records["alpha"][index] = material.opacity, material.alpha_cutoff, material.is_blended, index
             if mesh.skinning is not None and scene.animation is not None:
                 records["skinning"][index] = (
                     self._first_influences[instance.mesh],
@@ -218,9 +235,15 @@ def _interleaved(mesh: Mesh) -> np.ndarray:
 
 def _upload_texture(context: moderngl.Context, texture: Texture) -> moderngl.Texture:
     height, width, _ = texture.texels_srgb.shape
+    texels, internal_format = texture.texels_srgb, GL_SRGB8
+    if texture.opacity is not None:
+        texels = np.concatenate([texels, texture.opacity[..., None]], axis=2)
+        internal_format = GL_SRGB8_ALPHA8
     # Row 0 of the upload is v = 0, and glTF's v = 0 is the top row: no flip.
-    data = np.ascontiguousarray(texture.texels_srgb).tobytes()
-    uploaded = context.texture((width, height), 3, data, alignment=1, internal_format=GL_SRGB8)
+    data = np.ascontiguousarray(texels).tobytes()
+    uploaded = context.texture(
+        (width, height), texels.shape[2], data, alignment=1, internal_format=internal_format
+    )
     uploaded.build_mipmaps(0, max(0, math.floor(math.log2(max(width, height)))))
     uploaded.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
     uploaded.anisotropy = _MAX_ANISOTROPY

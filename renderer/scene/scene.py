@@ -1,7 +1,9 @@
 """A scene in plain arrays: meshes, materials, textures, lights and cameras.
 
-The runtime and the reference renderer share this description. Every surface is diffuse and two-sided.
-Lengths are in world units. Colours are linear, in the Rec. 709 primaries, unless a name says sRGB.
+The runtime and the reference renderer share this description. Every surface is diffuse and two-sided;
+some have holes, or let a share of the light pass. Lengths are in world units.
+
+Colours are linear, in the Rec. 709 primaries, unless a name says sRGB.
 """
 
 from collections.abc import Sequence
@@ -14,6 +16,7 @@ from jaxtyping import Float32, Float64, Int32, UInt8
 from vpltune.renderer.scene.scene_animation import Animation, Skinning
 
 Wrap = Literal["repeat", "mirrored_repeat", "clamp_to_edge"]
+AlphaMode = Literal["opaque", "mask", "blend"]
 LightKind = Literal["spot", "point", "directional"]
 Numbers = float | int | np.generic | Sequence[Any] | np.ndarray
 """What becomes an array of float64: a number, a sequence of them, of any depth, or an array."""
@@ -30,6 +33,8 @@ class Texture:
     texels_srgb: UInt8[np.ndarray, "height width 3"]
     wrap_u: Wrap = "repeat"
     wrap_v: Wrap = "repeat"
+    opacity: UInt8[np.ndarray, "height width"] | None = None
+    """Opacity of the texels in 255ths, filtered bilinearly; None where all are opaque."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +42,31 @@ class Material:
     """A diffuse material: albedo = base_color · texture(uv) · vertex colour.
 
     An absent texture or vertex colour counts as 1. `base_color` is linear, in [0, 1].
+
+    The opacity at a point is `opacity` times the texture's there. With the alpha mode `mask`, the surface is
+    where that is at least `alpha_cutoff`, and has holes elsewhere: for the camera, for light and for shadows.
+    With `blend`, it stops this share of the light and lets the rest pass straight through; the camera sees it
+    where that is at least `alpha_cutoff`, and what is behind it elsewhere.
     """
 
     name: str
     base_color: Float32[np.ndarray, "3"]
     texture: int | None = None
     """Index into `Scene.textures`."""
+    alpha_mode: AlphaMode = "opaque"
+    opacity: float = 1.0
+    """In [0, 1]; `opaque` ignores it."""
+    alpha_cutoff: float = 0.5
+
+    @property
+    def is_opaque(self) -> bool:
+        """Whether the surface stops all light, everywhere."""
+        return self.alpha_mode == "opaque"
+
+    @property
+    def is_blended(self) -> bool:
+        """Whether the surface stops a share of the light."""
+        return self.alpha_mode == "blend"
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,9 @@
 // Python: renderer/gpu/ray_hierarchy.py. Test against every triangle in float64: tests/support/traced_rays.py.
 
 #include "common/ray_intersection.glsl"
+#ifdef RAYS_MEET_HOLES
+#include "common/ray_alpha.glsl"
+#endif
 
 // A box and what it holds. Nodes stand in pairs, the two children of one parent. The low RAY_COUNT_BITS of `child` hold
 // the number of items of a leaf, and the bits above hold its first item. For an inner node the number is 0 and the bits
@@ -20,7 +23,7 @@ struct RayNode {
 
 struct RayInstance {
     mat3x4 world_to_instance;  // columns are the rows of the affine matrix
-    uvec4 root;                // x: root of the mesh's tree, as `child` of a node; the rest is unused
+    uvec4 root;                // x: root of the mesh's tree, as `child` of a node; y, z: as common/ray_alpha.glsl says
 };
 
 layout(std430, binding = RAY_NODES_BINDING) readonly buffer RayNodes {
@@ -91,6 +94,13 @@ RayHit ray_hit(vec3 origin_world, vec3 direction_world, float longest) {
             uint end = first + (current & RAY_COUNT_MASK);
             for (uint i = first; i < end; ++i) {
                 float met = triangle_distance(ray, ray_triangles[i], nearest);
+#ifdef RAYS_MEET_HOLES
+                if (met < nearest
+                    && !ray_meets_surface(
+                        ray_instances[instance].root.yz, instance, i, ray_triangles[i], ray, met)) {
+                    met = nearest;
+                }
+#endif
                 if (met < nearest) {
                     nearest = met;
                     hit = RayHit(met, i, instance);

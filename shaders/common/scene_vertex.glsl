@@ -14,6 +14,7 @@ struct SceneInstance {
     mat4 normal_to_world;  // cofactors of to_world's linear part, scaled; the last row and column are unused
     vec4 base_color;
     ivec4 skinning;        // first influence, first vertex, influences per vertex (0: no skin), first joint
+    vec4 alpha;            // opacity, cutoff, 1 if blended, number of the instance
 };
 
 layout(std430, binding = SCENE_INSTANCES_BINDING) readonly buffer SceneInstances {

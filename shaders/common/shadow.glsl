@@ -1,6 +1,12 @@
 // Shadows of the punctual lights, looked up in their RSMs.
 //
-// Provides: `shadow`. Needs common/gbuffer.glsl and common/rsm.glsl.
+// Provides: `shadow`. Needs common/gbuffer.glsl and common/rsm.glsl. With HAS_BLENDED, the scene has surfaces that let a
+// share of the light pass. The RSM then shows them in some texels, and shadows have maps of their own.
+
+#ifdef HAS_BLENDED
+uniform sampler2D shadow_depth;    // of what stops all light, as the RSM's
+uniform sampler2D shadow_passing;  // depth of the last blended surface before that, and the share that passes them all
+#endif
 
 // Choices. The bias is in RSM texels, so it does not depend on scale or resolution. The receiver moves along its normal
 // by NORMAL_BIAS texels times the sine of the angle of incidence; a blocker must lie DEPTH_BIAS texels in front of it.
@@ -48,8 +54,15 @@ float shadow(Light light, Receiver receiver, vec3 to_light) {
     float lit[4];
     for (int i = 0; i < 4; ++i) {
         ivec2 at = clamp(corner + ivec2(i & 1, i >> 1), ivec2(0), ivec2(RSM_RESOLUTION - 1));
+#ifdef HAS_BLENDED
+        float stored = texelFetch(shadow_depth, origin + at, 0).r;
+        vec4 passing = texelFetch(shadow_passing, origin + at, 0);
+        float before = passing.a < 1.0 && rsm_view_depth(face, passing.r) < moved_depth ? passing.a : 1.0;
+#else
         float stored = texelFetch(rsm_depth, origin + at, 0).r;
-        lit[i] = stored > 0.0 && rsm_view_depth(face, stored) < moved_depth ? 0.0 : 1.0;
+        const float before = 1.0;
+#endif
+        lit[i] = stored > 0.0 && rsm_view_depth(face, stored) < moved_depth ? 0.0 : before;
     }
     return mix(mix(lit[0], lit[1], blend.x), mix(lit[2], lit[3], blend.x), blend.y);
 }

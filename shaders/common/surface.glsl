@@ -11,13 +11,17 @@ in vec3 base_color;
 uniform sampler2D base_color_texture;
 uniform ivec2 mirrored;  // 1 where the texture repeats mirrored, which OpenGL samplers of moderngl lack
 
+// Where the texture is looked up.
+vec2 texture_place() {
+    vec2 folded = 1.0 - abs(mod(uv, 2.0) - 1.0);
+    return mix(uv, folded, vec2(mirrored));
+}
+
 // Albedo in [0, 1]: base colour times texture. Gradients come from `uv` before mirroring, which has a crease.
 vec3 surface_albedo() {
     vec2 dx = dFdx(uv);
     vec2 dy = dFdy(uv);
-    vec2 folded = 1.0 - abs(mod(uv, 2.0) - 1.0);
-    vec2 lookup = mix(uv, folded, vec2(mirrored));
-    return clamp(base_color * textureGrad(base_color_texture, lookup, dx, dy).rgb, 0.0, 1.0);
+    return clamp(base_color * textureGrad(base_color_texture, texture_place(), dx, dy).rgb, 0.0, 1.0);
 }
 
 // Unit normal of the triangle, turned towards the viewer (the camera or the light).

@@ -12,6 +12,9 @@ out vec3 position_world;
 out vec3 normal_world;
 out vec2 uv;
 out vec3 base_color;
+#ifdef HAS_ALPHA
+flat out vec4 alpha;
+#endif
 
 void main() {
     SceneVertex vertex = scene_vertex();
@@ -19,6 +22,9 @@ void main() {
     normal_world = vertex.normal_world;
     base_color = vertex.base_color;
     uv = in_uv;
+#ifdef HAS_ALPHA
+    alpha = scene_instances[in_instance].alpha;
+#endif
     vec3 position_camera = (world_to_camera * vec4(position_world, 1.0)).xyz;
     // Reversed depth without a far plane: depth = near_plane / distance along the view axis.
     gl_Position = vec4(position_camera.xy / tan_half_fov, near_plane, -position_camera.z);

@@ -8,6 +8,9 @@
 #include "common/lights.glsl"
 #include "common/octahedral.glsl"
 #include "common/surface.glsl"
+#ifdef HAS_ALPHA
+#include "common/surface_alpha.glsl"
+#endif
 
 uniform int face_index;
 
@@ -19,6 +22,11 @@ layout(location = 1) out vec4 out_reflectance;
 const float MAX_COSINE_RATIO = 8.0;
 
 void main() {
+#ifdef HAS_ALPHA
+    if (!stops_light_of_texel(ivec2(gl_FragCoord.xy))) {
+        discard;
+    }
+#endif
     Light light = lights[rsm_faces[face_index].light];
     vec3 to_light = towards_light(light, position_world);
     vec3 normal_geometric = geometric_normal(to_light);

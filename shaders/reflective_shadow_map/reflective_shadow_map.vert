@@ -1,27 +1,5 @@
-// Reflective shadow map: the scene from one light face. Depth is reversed: 1 at the near plane, 0 at infinity or, for
-// an orthographic face, at its range.
+// Reflective shadow map: the scene from one light face.
 //
 // Reads: the scene's vertices and instances, light faces. Output: position, normal, uv and base colour in world space.
 // Python: renderer/frame/passes/reflective_shadow_map.py. Source: Dachsbacher and Stamminger 2005.
-#include "common/scene_vertex.glsl"
-#include "common/lights.glsl"
-
-uniform int face_index;
-
-out vec3 position_world;
-out vec3 normal_world;
-out vec2 uv;
-out vec3 base_color;
-
-void main() {
-    SceneVertex vertex = scene_vertex();
-    position_world = vertex.position_world;
-    normal_world = vertex.normal_world;
-    base_color = vertex.base_color;
-    uv = in_uv;
-    RsmFace face = rsm_faces[face_index];
-    vec3 position_face = world_to_face(face, position_world);
-    gl_Position = face.orthographic != 0
-        ? vec4(position_face.xy / face.extent, 1.0 + position_face.z / face.near_or_range, 1.0)
-        : vec4(position_face.xy / face.extent, face.near_or_range, -position_face.z);
-}
+#include "common/rsm_vertex.glsl"

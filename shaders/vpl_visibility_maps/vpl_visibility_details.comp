@@ -16,6 +16,10 @@ void main() {
         ivec2 coarse = ivec2(edge % size, edge % texels / size);
         ivec2 texel = coarse * refinement + ivec2(place % refinement, place / refinement);
         VirtualPointLight vpl = virtual_point_lights[edge / texels];
+#ifdef RAYS_MEET_HOLES
+        // Not a seed of the coarse maps, and not dependent on the order of the blocks.
+        ray_seed = hashed(uint(edge)) + uint(place);
+#endif
         visibility_details[i] = cast_visibility_texel(vpl, visibility_axis(texel, size * refinement));
     }
 }

@@ -38,6 +38,9 @@ void main() {
     for (int k = lane; k < wanted_count; k += 64) {
         int i = wanted[k];
         ivec2 texel = ivec2(i % VISIBILITY_MAP_SIZE, i / VISIBILITY_MAP_SIZE);
+#ifdef RAYS_MEET_HOLES
+        ray_seed = uint(vpl_index * TEXELS + i);
+#endif
         visibility_maps[vpl_index * TEXELS + i] =
             cast_visibility_texel(vpl, visibility_axis(texel, VISIBILITY_MAP_SIZE));
     }

@@ -32,17 +32,19 @@ void main() {
 Trace = Callable[..., tuple[np.ndarray, np.ndarray]]
 
 
-def ray_tracer(context: moderngl.Context) -> Trace:
-    """(hierarchy, origins, directions, longest) → distances, and whether anything was met; on the GPU."""
+def ray_tracer(context: moderngl.Context, first: RayHierarchy | None = None) -> Trace:
+    """(hierarchy, origins, directions, longest) → distances, and whether anything was met; on the GPU.
+
+    Without `first`, for scenes whose surfaces are all opaque; else for those that need what it needs.
+    """
     resources = Resources(context)
+    defines, reads = (RAY_DEFINES, RAY_READS) if first is None else (first.defines, first.reads)
     shipped = shader_library.read_shader
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             shader_library, "read_shader", lambda name: _SHADER if name == "trace.comp" else shipped(name)
         )
-        program = ComputeProgram(
-            resources, "trace", RAY_DEFINES, reads=(*RAY_READS, "rays"), writes=("distances",)
-        )
+        program = ComputeProgram(resources, "trace", defines, reads=(*reads, "rays"), writes=("distances",))
 
     def trace(hierarchy: RayHierarchy, origins, directions, longest=np.inf):
         rays = np.zeros((len(origins), 8), np.float32)

@@ -27,9 +27,14 @@ def scene_digest(scene: Scene) -> str:
     for material in scene.materials:
         digest.update(f"texture {material.texture};".encode())
         _add_array(digest, material.base_color)
+        if not material.is_opaque:
+            alpha = f"{material.alpha_mode} {material.opacity!r} {material.alpha_cutoff!r};"
+            digest.update(alpha.encode())
     for texture in scene.textures:
         digest.update(f"wrap {texture.wrap_u} {texture.wrap_v};".encode())
         _add_array(digest, texture.texels_srgb)
+        if texture.opacity is not None:
+            _add_array(digest, texture.opacity)
     return digest.hexdigest()
 
 

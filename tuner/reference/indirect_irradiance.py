@@ -65,14 +65,15 @@ class IndirectIrradiance:
 
     def __init__(self, wavefront, surfaces: Surfaces, triangles: UnitTriangles, view: View):
         self._wavefront, self._surfaces, self._size = wavefront, surfaces, view.size
-        self._lights = PunctualLights(wavefront, triangles, view.lights)
+        self._lights = PunctualLights(surfaces, triangles, view.lights)
         eye = wavefront.vectors(triangles.to_unit(view.camera.position_world)[None, :])
         directions = ray_directions_world(view).reshape(-1, 3)
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
         directions = wavefront.vectors(np.tile(directions, (2, 1)))
 
         def see():
-            seen = surfaces.first_along(eye, directions, wavefront.all_true(2 * math.prod(view.size)))
+            lanes = wavefront.all_true(2 * math.prod(view.size))
+            seen = surfaces.first_along(eye, directions, lanes, seen=True)
             return seen, self._lights.irradiance(seen, seen.hit)
 
         self._seen, direct = wavefront.run(see)
@@ -204,10 +205,10 @@ class IndirectIrradiance:
         facing = (w.dot(y.shading_normal, to_x) > 0.0) & (w.dot(irradiance, irradiance) > 0.0)
         facing = alive & y.hit & facing & (density > 0.0)
         start = y.ray_origin(w, to_x)
-        visible = facing & ~w.occluded(start, x.ray_origin(w, -to_x) - start, 1.0, facing)
+        passing = self._surfaces.passing(start, x.ray_origin(w, -to_x) - start, 1.0, facing)
         # ρ/π · E · geometry ÷ (light-path density) × weight. The density of light paths cancels.
-        scale = density / w.maximum(density + paths / count, 1e-30)
-        return w.where(visible, y.albedo * irradiance * scale, 0.0)
+        scale = passing * density / w.maximum(density + paths / count, 1e-30)
+        return w.where(facing & (passing > 0.0), y.albedo * irradiance * scale, 0.0)
 
 
 def _cosine_density(wavefront, x: Surface, y: Surface):

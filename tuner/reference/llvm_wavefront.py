@@ -46,13 +46,15 @@ class LlvmWavefront:
         return dr.while_loop(state, condition, body)
 
     def closest_hit(
-        self, origin: Vector, direction: Vector, active: Array
+        self, origin: Vector, direction: Vector, active: Array, max_t: Array | None = None
     ) -> tuple[Array, Array, Array, Array]:
         """The first hit of each active ray: (whether it hits, triangle, barycentric b1, barycentric b2).
 
-        The last three are 0 on a miss.
+        The last three are 0 on a miss. A ray ends at `max_t` times the length of `direction`, if given.
         """
         ray = mi.Ray3f(mi.Point3f(origin), direction)
+        if max_t is not None:
+            ray.maxt = max_t
         found = self._scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         hit = active & found.is_valid()
         triangle = dr.select(hit, found.prim_index, mi.UInt32(0))
@@ -80,6 +82,10 @@ class LlvmWavefront:
     def vector(self, x: Array, y: Array, z: Array) -> Vector:
         """The vector (x, y, z) in each lane."""
         return mi.Vector3f(x, y, z)
+
+    def bits(self, number: Array) -> Array:
+        """The bits of float32 as uint32."""
+        return dr.reinterpret_array(mi.UInt32, number)
 
     def to_index(self, number: Array) -> Array:
         """Convert float32 to uint32, truncating."""

@@ -48,13 +48,16 @@ class NumpyWavefront:
                 return state
             state = _advanced(going, body(*state), state)
 
-    def closest_hit(self, origin, direction, active):
+    def closest_hit(self, origin, direction, active, max_t=np.inf):
         """The first hit of each active ray: (whether it hits, triangle, barycentric b1, barycentric b2)."""
         lanes = direction.shape[1]
         hit = np.zeros(lanes, bool)
         triangle = np.zeros(lanes, np.uint32)
         b1, b2 = np.zeros((2, lanes), np.float32)
+        limits = np.broadcast_to(max_t, hit.shape)
         for lane, ray in self._rays(origin, direction, active):
+            # Mitsuba's type stubs are those of its vectorised variants.
+            ray.maxt = float(limits[lane])  # pyright: ignore[reportAttributeAccessIssue]
             found = self._scene.ray_intersect_preliminary(ray, coherent=False, active=True)
             if found.is_valid():
                 hit[lane] = True
@@ -94,6 +97,10 @@ class NumpyWavefront:
     def vector(self, x, y, z):
         """The vector (x, y, z) in each lane."""
         return np.stack(np.broadcast_arrays(x, y, z))
+
+    def bits(self, number):
+        """The bits of float32 as uint32."""
+        return np.ascontiguousarray(number, np.float32).view(np.uint32)
 
     def to_index(self, number):
         """Convert float32 to uint32, truncating."""

@@ -8,7 +8,7 @@ from jaxtyping import Float32
 from vpltune.renderer.scene.scene import Light
 from vpltune.renderer.scene.spot_cone import cone_scale
 from vpltune.tuner.reference.directions import cone_direction, disc_point
-from vpltune.tuner.reference.surfaces import Surface
+from vpltune.tuner.reference.surfaces import Surface, Surfaces
 from vpltune.tuner.reference.unit_triangles import UnitTriangles
 
 SHORTENING = 2.0**-13
@@ -22,9 +22,11 @@ _ROWS = 5  # vectors for each light; see _light_table
 
 
 class PunctualLights:
-    """The lights of one view in unit space, on one wavefront."""
+    """The lights of one view in unit space, and the surfaces that shadow them."""
 
-    def __init__(self, wavefront, triangles: UnitTriangles, lights: tuple[Light, ...]):
+    def __init__(self, surfaces: Surfaces, triangles: UnitTriangles, lights: tuple[Light, ...]):
+        wavefront = surfaces.wavefront
+        self._surfaces = surfaces
         self._wavefront = wavefront
         self._table = wavefront.table(_light_table(triangles, lights))
         self.count = wavefront.table(np.array([len(lights)], np.uint32))
@@ -66,9 +68,9 @@ class PunctualLights:
             to_light, reach, irradiance, paths = self.arriving(index, at)
             lit = active & (w.dot(irradiance, irradiance) > 0.0)
             origin = at.ray_origin(w, to_light)
-            unshadowed = lit & ~w.occluded(origin, to_light, reach * (1.0 - SHORTENING), lit)
-            share = 1.0 if weight is None else weight(paths)
-            return index + 1, total + w.where(unshadowed, irradiance * share, 0.0)
+            passing = self._surfaces.passing(origin, to_light, reach * (1.0 - SHORTENING), lit)
+            share = passing if weight is None else passing * weight(paths)
+            return index + 1, total + w.where(lit & (passing > 0.0), irradiance * share, 0.0)
 
         state = (self.count * 0, at.position * 0.0)
         return w.loop(lambda index, _: index < self.count, add_light, state)[1]

@@ -31,7 +31,10 @@ def owen_scrambled(wavefront, reversed_bits, seed):
 
 
 def hashed(wavefront, counter, seed):
-    """Pseudorandom numbers in [0, 1) from 32-bit counters and seeds (Wellons' lowbias32)."""
+    """Pseudorandom numbers in [0, 1) from 32-bit counters and seeds (Wellons' lowbias32).
+
+    Twin: shaders/common/hash.glsl.
+    """
     x = counter ^ seed
     x = (x ^ x >> 16) * 0x21F0AAAD
     x = (x ^ x >> 15) * 0xD35A2D97

@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+from vpltune.tuner.reference.sobol import hashed
 from vpltune.tuner.reference.unit_triangles import WRAP_MODES, UnitTriangles, srgb_decode_table
 
 OFFSET = 2.0**-17
@@ -46,20 +47,25 @@ class Surfaces:
         self._textures = wavefront.table(triangles.textures)
         self._texels = wavefront.table(triangles.texels)
         self._linear = wavefront.table(srgb_decode_table())
+        self._has_holes = triangles.has_holes
+        self._alpha_rows = wavefront.table(triangles.triangle_alphas)
+        self._alphas = wavefront.table(triangles.alphas)
 
-    def first_along(self, origin, direction, active) -> Surface:
-        """The first surface along each active ray, with position and `origin` in unit space."""
+    def first_along(self, origin, direction, active, *, seen: bool = False) -> Surface:
+        """The first surface along each active ray, with position and `origin` in unit space.
+
+        Of blended surfaces, the first that stops the ray; or, for a camera's rays (`seen`), that it sees.
+        """
         w = self.wavefront
-        hit, triangle, b1, b2 = w.closest_hit(origin, direction, active)
+        if self._has_holes:
+            hit, triangle, b1, b2 = self._first_beyond_holes(origin, direction, active, seen)
+        else:
+            hit, triangle, b1, b2 = w.closest_hit(origin, direction, active)
         b0 = 1.0 - b1 - b2
         corners = w.take_vector(self._corners, triangle)
 
         def interpolated(table):
-            return (
-                w.take_vector(table, corners[0]) * b0
-                + w.take_vector(table, corners[1]) * b1
-                + w.take_vector(table, corners[2]) * b2
-            )
+            return self._interpolated(table, corners, b0, b1, b2)
 
         geometric = w.take_vector(self._geometric_normals, triangle)
         normal = interpolated(self._normals)
@@ -75,11 +81,105 @@ class Surfaces:
             albedo = albedo * self._texture(w.take(self._texture_rows, triangle), u, v)
         return Surface(hit, interpolated(self._positions), normal, geometric, albedo)
 
+    def passing(self, origin, direction, max_t, active):
+        """Share of the light in [0, 1] that comes through along each active ray; undefined for the others.
+
+        A ray ends at `max_t` times the length of `direction`.
+        """
+        w = self.wavefront
+        if not self._has_holes:
+            return w.where(w.occluded(origin, direction, max_t, active), 0.0, 1.0)
+        squared = w.dot(direction, direction)
+
+        def pass_one(going, start, left, share):
+            met, triangle, b1, b2 = w.closest_hit(start, direction, going, left)
+            share = w.where(met, share * (1.0 - self._stopped(triangle, b1, b2)[0]), share)
+            start = w.where(met, self._behind(triangle, b1, b2, direction), start)
+            left = max_t - w.dot(start - origin, direction) / squared
+            return going & met & (share > 0.0) & (left > 0.0), start, left, share
+
+        nothing = squared * 0.0
+        state = (active & (squared > 0.0), origin + direction * 0.0, nothing + max_t, nothing + 1.0)
+        return w.loop(lambda going, *_: going, pass_one, state)[-1]
+
+    def _first_beyond_holes(self, origin, direction, active, seen: bool):
+        """As the wavefront's `closest_hit`, of points where there is no hole.
+
+        A blended surface stops a ray with its opacity as the probability.
+        """
+        w = self.wavefront
+
+        def pass_one(going, start, *_):
+            met, triangle, b1, b2 = w.closest_hit(start, direction, going)
+            share, is_seen = self._stopped(triangle, b1, b2)
+            stops = met & (is_seen if seen else share > self._random(start, direction, triangle))
+            start = w.where(met, self._behind(triangle, b1, b2, direction), start)
+            return going & met & ~stops, start, stops, triangle, b1, b2
+
+        nothing = direction[0] * 0.0
+        going = active & (nothing == 0.0)
+        state = (
+            going,
+            origin + direction * 0.0,
+            going & (nothing > 0.0),
+            w.to_index(nothing),
+            nothing,
+            nothing,
+        )
+        return w.loop(lambda going, *_: going, pass_one, state)[2:]
+
+    def _stopped(self, triangle, b1, b2):
+        """Share of the light in [0, 1] that a surface stops at a point, and whether a camera sees it."""
+        w = self.wavefront
+        row = w.take(self._alpha_rows, triangle)
+        corners = w.take_vector(self._corners, triangle)
+        u, v = (self._interpolated_uv(corners, axis, 1.0 - b1 - b2, b1, b2) for axis in range(2))
+        texture = w.take(self._texture_rows, triangle)
+        texel = self._filtered(texture, u, v, lambda packed: w.to_number(packed >> 24) / 255.0)
+        opacity, cutoff, blended = (w.take(self._alphas, row * 3 + k) for k in range(3))
+        is_seen = (row == 0) | (opacity * texel >= cutoff)
+        return w.where(blended > 0.0, opacity * texel, w.where(is_seen, 1.0, 0.0)), is_seen
+
+    def _random(self, start, direction, triangle):
+        """A number in [0, 1) for each ray and triangle; rays that differ in a bit have unrelated ones."""
+        w = self.wavefront
+        mixed = triangle
+        for vector in (start, direction):
+            for axis in range(3):
+                # An odd factor, 2³²/φ (Knuth), so that equal bits on two axes do not cancel.
+                mixed = (mixed ^ w.bits(vector[axis])) * 0x9E3779B1
+        return hashed(w, mixed, 0)
+
+    def _behind(self, triangle, b1, b2, direction):
+        """The start of a ray that goes on through a surface: `OFFSET` beyond it."""
+        w = self.wavefront
+        corners = w.take_vector(self._corners, triangle)
+        position = self._interpolated(self._positions, corners, 1.0 - b1 - b2, b1, b2)
+        normal = w.take_vector(self._geometric_normals, triangle)
+        return position + normal * w.where(w.dot(normal, direction) > 0.0, OFFSET, -OFFSET)
+
+    def _interpolated(self, table, corners, b0, b1, b2):
+        w = self.wavefront
+        return (
+            w.take_vector(table, corners[0]) * b0
+            + w.take_vector(table, corners[1]) * b1
+            + w.take_vector(table, corners[2]) * b2
+        )
+
     def _interpolated_uv(self, corners, axis, b0, b1, b2):
         a, b, c = (self.wavefront.take(self._uv, corners[k] * 2 + axis) for k in range(3))
         return a * b0 + b * b1 + c * b2
 
     def _texture(self, row, u, v):
+        """Bilinear lookup of decoded colours."""
+        w = self.wavefront
+
+        def color(packed):
+            return w.vector(*(w.take(self._linear, (packed >> shift) & 255) for shift in (0, 8, 16)))
+
+        return self._filtered(row, u, v, color)
+
+    def _filtered(self, row, u, v, decoded):
         """Bilinear lookup of decoded texels. Texel centres lie at (i + 1/2)/size; v = 0 is the top."""
         w = self.wavefront
         first, width, height, wrap_u, wrap_v = (w.take(self._textures, row * 5 + k) for k in range(5))
@@ -91,8 +191,7 @@ class Surfaces:
             # table.
             column = w.minimum(w.to_index(column), width - 1)
             line = w.minimum(w.to_index(line), height - 1)
-            packed = w.take(self._texels, first + line * width + column)
-            return w.vector(*(w.take(self._linear, (packed >> shift) & 255) for shift in (0, 8, 16)))
+            return decoded(w.take(self._texels, first + line * width + column))
 
         top = texel(left, upper) * (1.0 - along_u) + texel(right, upper) * along_u
         bottom = texel(left, lower) * (1.0 - along_u) + texel(right, lower) * along_u

@@ -38,7 +38,16 @@ class UnitTriangles:
     textures: UInt32[np.ndarray, "textures 5"]
     """First texel, width, height, and the wrap modes along u and v as indices into `WRAP_MODES`."""
     texels: UInt32[np.ndarray, " texels"]
-    """sRGB bytes, red in the lowest."""
+    """sRGB bytes, red in the lowest, and opacity in the highest."""
+    triangle_alphas: UInt32[np.ndarray, " triangles"]
+    """Row of `alphas`. Row 0 is that of opaque materials."""
+    alphas: Float32[np.ndarray, "materials 3"]
+    """Opacity, cutoff, and 1 if blended."""
+
+    @property
+    def has_holes(self) -> bool:
+        """Whether a surface is not opaque."""
+        return len(self.alphas) > 1
 
     def to_unit(self, points_world: Float[np.ndarray, "*n 3"]) -> Float64[np.ndarray, "*n 3"]:
         """Map points from world to unit space."""
@@ -86,7 +95,9 @@ def unit_triangles(scene: Scene) -> UnitTriangles:
             for mesh, first in zip(meshes, first_vertex[:-1], strict=True)
         ]
     )
+    sizes = [len(mesh.triangles) for mesh in meshes]
     texture_of = [_texture_row(scene, mesh) for mesh in meshes]
+    alpha_of, alphas = _alphas(scene, meshes)
     textures, texels = _packed_textures(scene)
     return UnitTriangles(
         center_world=center,
@@ -99,9 +110,11 @@ def unit_triangles(scene: Scene) -> UnitTriangles:
         colors=np.concatenate([mesh.colors * scene.materials[mesh.material].base_color for mesh in meshes]),
         triangles=triangles.astype(np.uint32),
         geometric_normals=_geometric_normals(positions, triangles),
-        triangle_textures=np.repeat(texture_of, [len(mesh.triangles) for mesh in meshes]).astype(np.uint32),
+        triangle_textures=np.repeat(texture_of, sizes).astype(np.uint32),
         textures=textures,
         texels=texels,
+        triangle_alphas=np.repeat(alpha_of, sizes).astype(np.uint32),
+        alphas=alphas,
     )
 
 
@@ -127,11 +140,20 @@ def _texture_row(scene: Scene, mesh: Mesh) -> int:
     return 0 if texture is None else texture + 1
 
 
+def _alphas(scene: Scene, meshes: list[Mesh]) -> tuple[list[int], Float32[np.ndarray, "materials 3"]]:
+    """The row of each mesh's material, and the rows: one for all that is opaque, then one for each other."""
+    used = sorted({mesh.material for mesh in meshes if not scene.materials[mesh.material].is_opaque})
+    others = [scene.materials[i] for i in used]
+    rows = [(1.0, 0.0, 0.0), *((each.opacity, each.alpha_cutoff, each.is_blended) for each in others)]
+    row_of = {material: row for row, material in enumerate(used, start=1)}
+    return [row_of.get(mesh.material, 0) for mesh in meshes], np.array(rows, np.float32)
+
+
 def _packed_textures(
     scene: Scene,
 ) -> tuple[UInt32[np.ndarray, "textures 5"], UInt32[np.ndarray, " texels"]]:
     rows = [(0, 1, 1, 0, 0)]
-    texels: list[np.ndarray] = [np.array([0xFFFFFF], np.uint32)]
+    texels: list[np.ndarray] = [np.array([0xFFFFFFFF], np.uint32)]
     first = 1
     for texture in scene.textures:
         height, width, _ = texture.texels_srgb.shape
@@ -139,7 +161,8 @@ def _packed_textures(
             (first, width, height, WRAP_MODES.index(texture.wrap_u), WRAP_MODES.index(texture.wrap_v))
         )
         red, green, blue = texture.texels_srgb.reshape(-1, 3).T.astype(np.uint32)
-        texels.append(red | green << 8 | blue << 16)
+        opacity = np.uint32(255) if texture.opacity is None else texture.opacity.ravel().astype(np.uint32)
+        texels.append(red | green << 8 | blue << 16 | opacity << 24)
         first += width * height
     if first >= 2**31:
         raise InputError(f"{scene.name}: textures must hold fewer than 2^31 texels in all, got {first}")

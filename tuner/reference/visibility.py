@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from vpltune.renderer.scene.scene import Scene
+from vpltune.tuner.reference.sobol import hashed
 from vpltune.tuner.reference.surfaces import OFFSET
 from vpltune.tuner.reference.traced_scene import TracedScene, traced_scene
 
@@ -28,7 +29,8 @@ def ray_traced_visibility(
     """Whether each receiver sees each VPL: the middle of a disc, or of the part over the receiver's horizon.
 
     Both ends lie on surfaces, with unit normals on the lit side. If either end is behind the other's tangent
-    plane, the pair exchanges no light: it is False and costs no ray.
+    plane, the pair exchanges no light: it is False and costs no ray. A surface that stops a share of the
+    light hides a VPL from that share of the receivers, chosen by a hash of the pair.
 
     Args:
         scene: what is in the way.
@@ -73,7 +75,9 @@ def _unoccluded(traced: TracedScene, tables: list, pair, count: int) -> Bool[np.
     segment = segment + _offset_in_sight(w, normal, vpl_normal, segment, w.take(radii, vpl))
     facing = w.dot(normal, segment) > 0.0
     facing = facing & (w.dot(vpl_normal, segment) < 0.0)
-    return w.to_numpy(facing & ~w.occluded(origin, segment, 1.0, facing))
+    # Whether one ray of many comes through.
+    random = hashed(w, receiver * row_length + vpl, 0)
+    return w.to_numpy(facing & (traced.surfaces.passing(origin, segment, 1.0, facing) > random))
 
 
 def _offset_in_sight(w, normal, vpl_normal, segment, radius):

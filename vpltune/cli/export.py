@@ -160,7 +160,7 @@ def _write_with_view(config: "TunedConfig", to: Form, output: Path, bundle: "Sce
     from vpltune.renderer.files.atomic_file import write_text_whole
 
     width, height = bundle.document["view"]["size"]
-    unseen = left_out(config, (width, height))
+    unseen = left_out(config, (width, height), bundle.drawn_whole)
     warn(unseen)
     if to == "bundle":
         write_bundle(output, bundle)

@@ -12,18 +12,21 @@ from vpltune.renderer.gpu.resources import Resources
 
 
 class DirectLightPass(FramePass):
-    """G-buffer, RSM, light accumulation → direct irradiance."""
+    """G-buffer, RSM, light accumulation → direct irradiance.
+
+    `shadow_reads` names the shadow maps of a scene with blended surfaces.
+    """
 
     name = "direct_light"
 
-    def __init__(self, resources: Resources, rsm: ReflectiveShadowMap):
+    def __init__(self, resources: Resources, rsm: ReflectiveShadowMap, shadow_reads: tuple[str, ...] = ()):
         self._rsm = rsm
         self._groups = pixel_groups(resources.texture("direct_irradiance"))
         self._program = ComputeProgram(
             resources,
             "direct_light/direct_light",
-            {"RSM_RESOLUTION": rsm.resolution},
-            reads=(*GBUFFER_READS, *RSM_READS, "light_accumulation"),
+            {"RSM_RESOLUTION": rsm.resolution, **({"HAS_BLENDED": 1} if shadow_reads else {})},
+            reads=(*GBUFFER_READS, *RSM_READS, *shadow_reads, "light_accumulation"),
             writes=("direct_irradiance as irradiance",),
         )
 

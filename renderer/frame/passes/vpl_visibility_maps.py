@@ -4,12 +4,11 @@ from vpltune.renderer.config.artist_parameters import parameter_spec
 from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
 from vpltune.renderer.frame.visibility_map_layout import MAP_READS, TEXEL_BYTES, VisibilityMapLayout
 from vpltune.renderer.gpu.gpu_program import ComputeProgram
-from vpltune.renderer.gpu.ray_hierarchy import RAY_DEFINES, RAY_READS, RayHierarchy
+from vpltune.renderer.gpu.ray_hierarchy import RayHierarchy
 from vpltune.renderer.gpu.render_targets import EMPTY_DISPATCH
 from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.gpu.shader_library import MOST_WORKGROUPS
 
-_CAST_READS = (*RAY_READS, "frame_statistics", "virtual_point_lights")
 _MARKS_BYTES = 8
 """Bytes of the marks of a map's row."""
 
@@ -39,7 +38,8 @@ class VplVisibilityMapsPass(FramePass):
         resources["visibility_details"] = context.buffer(reserve=detail_texels * TEXEL_BYTES)
         resources["visibility_edges"] = context.buffer(reserve=len(EMPTY_DISPATCH) + 4 * blocks)
         resources["visibility_marks"] = context.buffer(reserve=vpl_count * layout.size * _MARKS_BYTES)
-        defines = {**RAY_DEFINES, **layout.defines, "VISIBILITY_BLOCKS": blocks}
+        cast_reads = (*hierarchy.reads, "frame_statistics", "virtual_point_lights")
+        defines = {**hierarchy.defines, **layout.defines, "VISIBILITY_BLOCKS": blocks}
         self._marks = ComputeProgram(
             resources,
             "vpl_visibility_maps/vpl_visibility_marks",
@@ -51,7 +51,7 @@ class VplVisibilityMapsPass(FramePass):
             resources,
             "vpl_visibility_maps/vpl_visibility_maps",
             defines,
-            reads=(*_CAST_READS, "visibility_details", "visibility_marks"),
+            reads=(*cast_reads, "visibility_details", "visibility_marks"),
             writes=("visibility_maps",),
         )
         self._edges = ComputeProgram(
@@ -68,7 +68,7 @@ class VplVisibilityMapsPass(FramePass):
             resources,
             "vpl_visibility_maps/vpl_visibility_details",
             defines,
-            reads=(*_CAST_READS, "visibility_edges", "visibility_maps"),
+            reads=(*cast_reads, "visibility_edges", "visibility_maps"),
             writes=("visibility_details",),
         )
 

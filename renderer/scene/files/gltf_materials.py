@@ -1,23 +1,25 @@
 """glTF materials: base-colour factors and textures. A diffuse material has no use for the rest."""
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float32, Float64, UInt8
+from jaxtyping import Float64
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, label
 from vpltune.renderer.scene.files.gltf_accessors import GltfAccessors
-from vpltune.renderer.scene.files.gltf_buffers import read_uri
 from vpltune.renderer.scene.files.gltf_document import GltfDocument
-from vpltune.renderer.scene.files.image_texels import GLTF_FORMATS, ImageDecoder
+from vpltune.renderer.scene.files.gltf_textures import (
+    GltfTextures,
+    Layers,
+    placed_alike,
+    uv_set,
+    uv_transform,
+)
 from vpltune.renderer.scene.files.json_object import JsonObject, shown
-from vpltune.renderer.scene.scene import Material, Texture, Wrap
+from vpltune.renderer.scene.files.opacity import say_blended, without_idle_alpha
+from vpltune.renderer.scene.scene import AlphaMode, Material, Texture
 
-# OpenGL enums of wrap modes, as a glTF sampler gives them.
-_WRAPS: dict[int, Wrap] = {33071: "clamp_to_edge", 33648: "mirrored_repeat", 10497: "repeat"}
-# And of nearest filters.
-_NEAREST_FILTERS = (9728, 9984, 9986)
+_ALPHA_MODES: dict[str, AlphaMode] = {"MASK": "mask", "BLEND": "blend"}
 
 # Extensions in place of metallic-roughness, so that its metallicFactor says nothing.
 _WITHOUT_METAL = ("KHR_materials_pbrSpecularGlossiness", "KHR_materials_unlit")
@@ -40,13 +42,15 @@ class GltfMaterials:
 
     def __init__(self, document: GltfDocument, accessors: GltfAccessors) -> None:
         self._document = document
-        self._buffers = accessors.buffers
-        self._decoder = ImageDecoder(GLTF_FORMATS)
+        self._textures = GltfTextures(document, accessors)
         self.materials: list[Material] = []
-        self.textures: list[Texture] = []
         self._base_colors: dict[str, BaseColor] = {}
-        self._texture_indices: dict[tuple[str, Wrap, Wrap], int] = {}
-        self._texels: dict[str, UInt8[np.ndarray, "height width 3"]] = {}
+        self._left_out: set[str] = set()
+
+    @property
+    def textures(self) -> list[Texture]:
+        """The textures that the materials refer to."""
+        return self._textures.textures
 
     def of(self, primitive: JsonObject) -> BaseColor:
         """The base colour of a primitive; white if the primitive has no material.
@@ -61,26 +65,78 @@ class GltfMaterials:
             self._base_colors[material.where] = self._read(material)
         return self._base_colors[material.where]
 
+    def is_unlit(self, primitive: JsonObject) -> bool:
+        """Whether a primitive has its colour without any light: KHR_materials_unlit, as of painted skies."""
+        material = self._document.referred(primitive, "material", "materials")
+        return material is not None and material.extension("KHR_materials_unlit") is not None
+
+    def leave_out(self, primitive: JsonObject) -> None:
+        """Say that surfaces with the material of an unlit primitive are left out; once for each material."""
+        material = self._document.referred(primitive, "material", "materials")
+        if material is None or material.where in self._left_out:
+            return
+        self._left_out.add(material.where)
+        self._document.warnings.tally(
+            "1 material is unlit; its surfaces are left out: they cast no shadow and reflect no light",
+            "{n} materials are unlit; their surfaces are left out: they cast no shadow and reflect no light",
+        )
+
     def _read(self, material: JsonObject) -> BaseColor:
         holder, factor_key, texture_key = self._base_color_keys(material)
-        factor = holder.numbers(factor_key, 4, default=(1.0, 1.0, 1.0, 1.0))[:3]
+        factor = holder.numbers(factor_key, 4, default=(1.0, 1.0, 1.0, 1.0))
         # 1e-6 accepts a 1 in single precision, such as 1.0000001.
         if (factor < 0.0).any() or (factor > 1.0 + 1e-6).any():
             raise SceneFileError(f"{holder.at(factor_key)}: must lie in [0, 1], got {shown(factor.tolist())}")
         self._warn_of_ignored(material)
-        info = holder.object(texture_key)
-        texture = None if info is None else self._texture(info)
+        color = holder.object(texture_key)
+        metallic, metal = self._metalness(material, color)
+        mode = _ALPHA_MODES.get(material.string("alphaMode", "OPAQUE"), "opaque")
+        layers = Layers(color, metal, metallic, has_alpha=mode != "opaque")
+        texture = self._textures.of(layers)
+        red_green_blue = factor[:3] * (1.0 - metallic) if metal is None else factor[:3]
         name = label(material.string("name", ""), f"material {len(self.materials)}")
-        base_color = np.minimum(factor, 1.0).astype(np.float32)
-        self.materials.append(Material(name, base_color, texture))
-        if info is None or texture is None:
+        base_color = np.minimum(red_green_blue, 1.0).astype(np.float32)
+        read = Material(name, base_color, texture, mode)
+        if mode != "opaque":
+            read = replace(read, opacity=min(float(factor[3]), 1.0))
+        if mode == "mask":
+            read = replace(read, alpha_cutoff=material.number("alphaCutoff", 0.5, low=0.0))
+        read = self._transmitting(read, material, color, 1.0 - metallic)
+        read = without_idle_alpha(read, None if texture is None else self.textures[texture])
+        say_blended(read, self._document.warnings)
+        self.materials.append(read)
+        if layers.placed is None or texture is None:
             return BaseColor(len(self.materials) - 1)
-        transform = info.extension("KHR_texture_transform")
-        uv_set = info.integer("texCoord", 0)
-        if transform is None:
-            return BaseColor(len(self.materials) - 1, uv_set)
-        return BaseColor(
-            len(self.materials) - 1, transform.integer("texCoord", uv_set), _uv_transform(transform)
+        return BaseColor(len(self.materials) - 1, uv_set(layers.placed), uv_transform(layers.placed))
+
+    def _transmitting(
+        self, read: Material, material: JsonObject, color: JsonObject | None, matt: float
+    ) -> Material:
+        """The material with KHR_materials_transmission: of the light that its diffuse base would reflect, the
+        share t passes instead, tinted by the base colour. The tint is kept in the mean of the channels alone.
+        """
+        transmission = material.extension("KHR_materials_transmission")
+        share = (
+            0.0 if transmission is None else matt * transmission.number("transmissionFactor", 0.0, 0.0, 1.0)
+        )
+        if transmission is None or share == 0.0:
+            return read
+        info = transmission.object("transmissionTexture")
+        if info is not None:
+            self._document.warnings.tally(
+                "1 transmission texture counts by its mean", "{n} transmission textures count by their means"
+            )
+            share *= self._textures.mean_red(info)
+        tint = read.base_color if color is None else read.base_color * self._textures.mean_color(color)
+        passing = share * float(tint.mean())
+        # What does not pass is reflected, or absorbed by the tint.
+        reflected = (1.0 - share) / (1.0 - passing) if passing < 1.0 else 0.0
+        return replace(
+            read,
+            base_color=read.base_color * np.float32(reflected),
+            alpha_mode="blend",
+            opacity=(1.0 if read.is_opaque else read.opacity) * (1.0 - passing),
+            alpha_cutoff=0.5,
         )
 
     def _base_color_keys(self, material: JsonObject) -> tuple[JsonObject, str, str]:
@@ -103,111 +159,42 @@ class GltfMaterials:
                 "1 material emits light; emission does not light the scene yet",
                 "{n} materials emit light; emission does not light the scene yet",
             )
-        self._warn_of_metal(material)
-        if material.string("alphaMode", "OPAQUE") != "OPAQUE":
+        if material.extension("KHR_materials_diffuse_transmission") is not None:
             warnings.tally(
-                "1 material has an alpha mode; it is drawn opaque",
-                "{n} materials have an alpha mode; they are drawn opaque",
+                "1 material transmits light diffusely; it is drawn opaque",
+                "{n} materials transmit light diffusely; they are drawn opaque",
             )
-        for name in ("KHR_materials_transmission", "KHR_materials_diffuse_transmission"):
-            if material.extension(name) is not None:
-                warnings.tally(
-                    "1 material transmits light; it is drawn opaque",
-                    "{n} materials transmit light; they are drawn opaque",
-                )
         if material.extension("KHR_materials_unlit") is not None:
             warnings.tally(
-                "1 material is marked unlit; it is lit like any other",
-                "{n} materials are marked unlit; they are lit like any other",
+                "1 material is unlit, and no other surface is there: it is lit like any other",
+                "{n} materials are unlit, and no other surface is there: they are lit like any other",
             )
 
-    def _warn_of_metal(self, material: JsonObject) -> None:
+    def _metalness(self, material: JsonObject, color: JsonObject | None) -> tuple[float, JsonObject | None]:
+        """The metallic factor, and the textureInfo that multiplies it; None where the factor says all.
+
+        A texture that is placed otherwise than the base colour's counts by its mean.
+        """
         holder = material.object("pbrMetallicRoughness")
-        # By the letter, what leaves the whole object out is a white metal: a placeholder, not worth a word.
+        # By the letter, what leaves the whole object out is a white metal: a placeholder, drawn matt.
         if holder is None or any(map(material.extension, _WITHOUT_METAL)):
-            return
-        if holder.number("metallicFactor", 1.0) <= 0.0:
-            return
-        by = " by its texture" if holder.object("metallicRoughnessTexture") is not None else ""
-        self._document.warnings.tally(
-            f"1 material is metallic{by}; it is drawn matt, in its base colour",
-            f"{{n}} materials are metallic{by.replace('its', 'their')}; they are drawn matt, in their base "
-            "colours",
-        )
-
-    def _texture(self, info: JsonObject) -> int | None:
-        textures = self._document.list_of("textures")
-        texture = textures[info.required_index("index", len(textures), "textures")]
-        image = self._image(texture)
-        if image is None:
-            self._document.warnings.tally(
-                "1 texture has no image in a supported format; white is used",
-                "{n} textures have no image in a supported format; white is used",
-            )
-            return None
-        wrap_u, wrap_v = self._wraps(texture)
-        key = (image.where, wrap_u, wrap_v)
-        if key not in self._texture_indices:
-            self._texture_indices[key] = len(self.textures)
-            name = label(image.string("name", ""), image.where)
-            self.textures.append(Texture(name, self._texels_of(image), wrap_u, wrap_v))
-        return self._texture_indices[key]
-
-    def _image(self, texture: JsonObject) -> JsonObject | None:
-        webp = texture.extension("EXT_texture_webp")
-        if webp is not None and "source" in webp.members:
-            return self._document.referred(webp, "source", "images")
-        return self._document.referred(texture, "source", "images")
-
-    def _wraps(self, texture: JsonObject) -> tuple[Wrap, Wrap]:
-        sampler = self._document.referred(texture, "sampler", "samplers")
-        if sampler is None:
-            return "repeat", "repeat"
-        modes = [sampler.integer(key, 10497) for key in ("wrapS", "wrapT")]
-        for key, mode in zip(("wrapS", "wrapT"), modes, strict=True):
-            if mode not in _WRAPS:
-                raise SceneFileError(
-                    f"{sampler.at(key)}: must be one of {', '.join(map(str, _WRAPS))}, got {mode}"
+            return 0.0, None
+        factor = holder.number("metallicFactor", 1.0, low=0.0, high=1.0)
+        info = holder.object("metallicRoughnessTexture")
+        image = None if info is None or factor == 0.0 else self._textures.image(info)
+        if info is not None and image is not None:
+            metalness = self._textures.texels(image)[..., 2]
+            if metalness.min() == metalness.max():
+                factor, info = factor * int(metalness.min()) / 255.0, None
+            elif color is not None and not placed_alike(info, color):
+                self._document.warnings.tally(
+                    "1 metallic texture is placed otherwise than the base colour's; its mean counts",
+                    "{n} metallic textures are placed otherwise than the base colours'; their means count",
                 )
-        if sampler.members.get("magFilter") in _NEAREST_FILTERS:
+                factor, info = factor * float(metalness.mean()) / 255.0, None
+        if factor > 0.0:
             self._document.warnings.tally(
-                "1 texture asks for nearest filtering; it is filtered bilinearly",
-                "{n} textures ask for nearest filtering; they are filtered bilinearly",
+                "1 material is metallic; its diffuse part is drawn, its reflections are not",
+                "{n} materials are metallic; their diffuse parts are drawn, their reflections are not",
             )
-        return _WRAPS[modes[0]], _WRAPS[modes[1]]
-
-    def _texels_of(self, image: JsonObject) -> UInt8[np.ndarray, "height width 3"]:
-        if image.where not in self._texels:
-            if "uri" in image.members:
-                content: bytes | memoryview = read_uri(self._document, image)
-            else:
-                content = self._buffers.view(image)[0]
-            source = image.string("uri", "")
-            where = image.where if source[:5].lower() in ("", "data:") else f"{image.where} {source!r:.80}"
-            self._texels[image.where] = self._decoder.decode(content, where)
-        return self._texels[image.where]
-
-
-def _uv_transform(transform: JsonObject) -> Float64[np.ndarray, "2 3"]:
-    """KHR_texture_transform as a 2 × 3 matrix: translation · rotation · scale.
-
-    The rotation is counter-clockwise with v pointing down. The extension's prose, its worked example and the
-    implementations agree on this; the code listing in the first version had the opposite sign (Khronos glTF
-    issue 1563).
-    """
-    offset = transform.numbers("offset", 2, default=(0.0, 0.0))
-    scale = transform.numbers("scale", 2, default=(1.0, 1.0))
-    angle = transform.number("rotation", 0.0)
-    cos, sin = math.cos(angle), math.sin(angle)
-    return np.array(
-        [[cos * scale[0], sin * scale[1], offset[0]], [-sin * scale[0], cos * scale[1], offset[1]]]
-    )
-
-
-def transformed_uv(
-    uv: Float32[np.ndarray, "n 2"], transform: Float64[np.ndarray, "2 3"] | None
-) -> Float32[np.ndarray, "n 2"]:
-    """Texture coordinates transformed by `BaseColor.uv_transform`; unchanged if it is None."""
-    if transform is None:
-        return uv
-    return (uv.astype(np.float64) @ transform[:, :2].T + transform[:, 2]).astype(np.float32)
+        return factor, info if image is not None else None

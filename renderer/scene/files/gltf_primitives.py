@@ -10,7 +10,8 @@ from vpltune.renderer.scene.files.gltf_accessors import Elements, GltfAccessors
 from vpltune.renderer.scene.files.gltf_deformation import Deformation, morphed, read_influences, skinned
 from vpltune.renderer.scene.files.gltf_document import GltfDocument
 from vpltune.renderer.scene.files.gltf_draco import DracoDecoder, decode_draco
-from vpltune.renderer.scene.files.gltf_materials import BaseColor, transformed_uv
+from vpltune.renderer.scene.files.gltf_materials import BaseColor
+from vpltune.renderer.scene.files.gltf_textures import transformed_uv
 from vpltune.renderer.scene.files.json_object import JsonObject
 from vpltune.renderer.scene.files.limits import MAX_MORPH_BYTES, DecodedBytes
 from vpltune.renderer.scene.files.surface import Surface, finished_mesh, used_vertices

@@ -36,7 +36,9 @@ def read_gltf(path: Path, warnings: Warnings) -> Scene:
     document = open_gltf(path, warnings)
     with DracoDecoder() as draco:
         builder = _SceneBuilder(document, draco)
-        for index in builder.nodes.shown():
+        shown = list(builder.nodes.shown())
+        builder.look_for_lit_surfaces(shown)
+        for index in shown:
             builder.add_node(index)
     return Scene(
         name=label(path.stem, "scene"),
@@ -66,10 +68,18 @@ class _SceneBuilder:
         self.placed = Placed()
         moving = self.nodes.with_descendants({channel.node for channel in self.channels})
         self.deformations = GltfDeformations(document, self.nodes, self.accessors, moving)
+        self._has_lit = False
         self._surfaces: dict[str, list[JsonObject]] = {}
         self._skins: dict[RestSkin, int] = {}
         self._meshes_at_rest: dict[tuple[str, Deformation], int | None] = {}
         self._counts: Counter[str] = Counter()
+
+    def look_for_lit_surfaces(self, shown: list[int]) -> None:
+        """See whether anything is there for light to fall on; if not, unlit surfaces are lit."""
+        meshes = [self.document.referred(self.nodes.nodes[i], "mesh", "meshes") for i in shown]
+        placed = {mesh.where: mesh for mesh in meshes if mesh is not None}
+        primitives = (primitive for mesh in placed.values() for primitive in mesh.objects("primitives"))
+        self._has_lit = any(not self.materials.is_unlit(primitive) for primitive in primitives)
 
     def add_node(self, index: int) -> None:
         node = self.nodes.nodes[index]
@@ -132,9 +142,17 @@ class _SceneBuilder:
     def _surfaces_of(self, mesh: JsonObject) -> list[JsonObject]:
         if mesh.where not in self._surfaces:
             self._surfaces[mesh.where] = [
-                primitive for primitive in mesh.objects("primitives") if self.primitives.is_surface(primitive)
+                primitive
+                for primitive in mesh.objects("primitives")
+                if self.primitives.is_surface(primitive) and not self._is_left_out(primitive)
             ]
         return self._surfaces[mesh.where]
+
+    def _is_left_out(self, primitive: JsonObject) -> bool:
+        if not (self._has_lit and self.materials.is_unlit(primitive)):
+            return False
+        self.materials.leave_out(primitive)
+        return True
 
     def _placed_skin(self, skin: RestSkin) -> int:
         if skin not in self._skins:

@@ -3,6 +3,8 @@
 import io
 import struct
 import warnings
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from jaxtyping import UInt8
@@ -42,6 +44,18 @@ class ImageDecoder:
         Raises:
             SceneFileError: the format is unsupported, or the image is broken, cut off or too large.
         """
+        return self._read(content, where, lambda image: _strips(image, _strip_rgb, 3))
+
+    def opacity(self, content: bytes | memoryview, where: str) -> UInt8[np.ndarray, "height width"] | None:
+        """The alpha channel of an image file, row 0 at the top; None without one, or where all is opaque.
+
+        Raises:
+            SceneFileError: as `decode`.
+        """
+        texels = self._read(content, where, _alpha)
+        return None if texels is None or texels.min() == 255 else texels[..., 0]
+
+    def _read(self, content: bytes | memoryview, where: str, convert: Callable[[Image.Image], Any]) -> Any:
         if len(content) > MAX_IMAGE_BYTES:
             raise SceneFileError(
                 f"{where}: an image file must have at most {MAX_IMAGE_BYTES >> 20} MiB, "
@@ -54,7 +68,7 @@ class ImageDecoder:
                 warnings.simplefilter("ignore")
                 with Image.open(io.BytesIO(content), formats=self._formats) as image:
                     self._check_size(image.size, len(content), where)
-                    return _rgb(image)
+                    return convert(image)
         except SceneFileError:
             raise
         except Image.DecompressionBombError as error:
@@ -75,22 +89,38 @@ class ImageDecoder:
                 f"{where}: an image must be at most {MAX_IMAGE_SIDE} texels on a side and "
                 f"{MAX_IMAGE_TEXELS:,} in all, got {width} × {height}"
             )
-        self._texels += width * height
         self._bytes += encoded
+        self.spend(width * height, f"this one of {width} × {height}", where)
+
+    def spend(self, texels: int, what: str, where: str) -> None:
+        """Count texels, also of images that are made of decoded ones. Messages call them `what`.
+
+        Raises:
+            SceneFileError: the scene has too many.
+        """
+        self._texels += texels
         most = min(FREE_TEXELS + TEXELS_PER_BYTE * self._bytes, MAX_SCENE_TEXELS)
         if self._texels > most:
             raise SceneFileError(
                 f"{where}: the images of this scene must have at most {most:,} texels together, and with "
-                f"this one of {width} × {height} they have {self._texels:,}"
+                f"{what} they have {self._texels:,}"
             )
 
 
-def _rgb(image: Image.Image) -> UInt8[np.ndarray, "height width 3"]:
+def _alpha(image: Image.Image) -> UInt8[np.ndarray, "height width 1"] | None:
+    if not image.has_transparency_data:
+        return None
+    return _strips(image, lambda strip: np.asarray(strip.convert("RGBA"))[..., 3:], 1)
+
+
+def _strips(
+    image: Image.Image, convert: Callable[[Image.Image], np.ndarray], channels: int
+) -> UInt8[np.ndarray, "height width channels"]:
     width, height = image.size
-    texels = np.empty((height, width, 3), np.uint8)
+    texels = np.empty((height, width, channels), np.uint8)
     for top in range(0, height, _STRIP_ROWS):
         strip = image.crop((0, top, width, min(top + _STRIP_ROWS, height)))
-        texels[top : top + _STRIP_ROWS] = _strip_rgb(strip)
+        texels[top : top + _STRIP_ROWS] = convert(strip)
     return texels
 
 

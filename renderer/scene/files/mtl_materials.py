@@ -1,20 +1,25 @@
 """Wavefront MTL: the diffuse colour and map of materials. A diffuse material has no use for the rest."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
-from jaxtyping import Float32
+from jaxtyping import Float32, UInt8
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, label, one_line
 from vpltune.renderer.scene.files.image_texels import MTL_FORMATS, ImageDecoder
+from vpltune.renderer.scene.files.opacity import say_blended, without_idle_alpha
 from vpltune.renderer.scene.files.plain_numbers import plain_number
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
+from vpltune.renderer.scene.files.texel_products import of_size
 from vpltune.renderer.scene.files.text_lines import first_word, text_lines, without_remark
 from vpltune.renderer.scene.scene import Material, Texture, Wrap
 
+_Image = TypeVar("_Image")
+
 # Statements that end in a name.
-_NAMING = (b"newmtl", b"map_kd")
+_NAMING = (b"newmtl", b"map_kd", b"map_d")
 # Options of map_Kd and how many words follow each. The options in `_TRANSFORMS` take one to three numbers.
 _MAP_OPTIONS = {
     "-blendu": 1,
@@ -42,6 +47,9 @@ class _Definition:
     wrap: Wrap = "repeat"
     opacity: float | None = None
     """As `d` says it, or else 1 − `Tr`. None where neither does."""
+    metallic: float = 0.0
+    """As `Pm` says it, in [0, 1]."""
+    opacity_path: str = ""
 
 
 @dataclass(frozen=True)
@@ -103,7 +111,7 @@ class MtlMaterials:
         self._warnings = warnings
         self._decoder = ImageDecoder(MTL_FORMATS)
         self._definitions: dict[str, _Definition] = {}
-        self._texture_indices: dict[tuple[str, Wrap], int | None] = {}
+        self._texture_indices: dict[tuple[str, str, Wrap], int | None] = {}
         self._missing_maps: list[str] = []
         self._libraries: dict[str, bool] = {}
         self.materials: list[Material] = []
@@ -136,11 +144,6 @@ class MtlMaterials:
                 "{n} materials are not defined in any library; white is used",
             )
         definition = definition or _Definition()
-        if definition.opacity is not None and definition.opacity < 1.0:
-            self._warnings.tally(
-                "1 material is see-through (d, Tr); it is drawn opaque",
-                "{n} materials are see-through (d, Tr); they are drawn opaque",
-            )
         texture = self._texture(definition)
         diffuse = np.ones(3, np.float32) if definition.diffuse is None else definition.diffuse
         if texture is not None and not diffuse.any():
@@ -148,7 +151,17 @@ class MtlMaterials:
                 "1 material is black: its Kd 0 0 0 multiplies its map_Kd",
                 "{n} materials are black: their Kd 0 0 0 multiplies their map_Kd",
             )
-        self.materials.append(Material(label(name, "default"), diffuse, texture))
+        if definition.metallic > 0.0:
+            self._warnings.tally(
+                "1 material is metallic; its diffuse part is drawn, its reflections are not",
+                "{n} materials are metallic; their diffuse parts are drawn, their reflections are not",
+            )
+            diffuse = diffuse * np.float32(1.0 - definition.metallic)
+        opacity = 1.0 if definition.opacity is None else min(max(definition.opacity, 0.0), 1.0)
+        material = Material(label(name, "default"), diffuse, texture, "blend", opacity)
+        material = without_idle_alpha(material, None if texture is None else self.textures[texture])
+        say_blended(material, self._warnings)
+        self.materials.append(material)
         return len(self.materials) - 1
 
     def say_what_is_missing(self) -> None:
@@ -161,23 +174,48 @@ class MtlMaterials:
             )
 
     def _texture(self, definition: _Definition) -> int | None:
-        if not definition.map_path:
+        if not definition.map_path and not definition.opacity_path:
             return None
-        key = (definition.map_path, definition.wrap)
+        key = (definition.map_path, definition.opacity_path, definition.wrap)
         if key not in self._texture_indices:
             self._texture_indices[key] = self._read_texture(definition)
         return self._texture_indices[key]
 
     def _read_texture(self, definition: _Definition) -> int | None:
-        path = definition.map_path.replace("\\", "/")
-        try:
-            content = self._folder.read(path, "map_Kd")
-        except SceneFileError:
-            self._missing_maps.append(definition.map_path)
+        wrap = definition.wrap
+        texels = self._image(definition.map_path, "map_Kd", self._decoder.decode)
+        opacity = self._image(definition.opacity_path, "map_d", self._opacity)
+        if texels is None and opacity is None:
             return None
-        texels = self._decoder.decode(content, f"map_Kd {path!r:.80}")
-        self.textures.append(Texture(label(path, "map_Kd"), texels, definition.wrap, definition.wrap))
+        if opacity is not None:
+            sizes = [opacity.shape] if texels is None else [opacity.shape, texels.shape[:2]]
+            height, width = np.max(sizes, axis=0).tolist()
+            where = f"map_d {definition.opacity_path!r:.80}"
+            self._decoder.spend(width * height, f"its texels of {width} × {height}", where)
+            white = np.full((height, width, 3), 255, np.uint8)
+            texels = white if texels is None else of_size(texels, width, height)
+            opacity = of_size(opacity, width, height)
+        assert texels is not None
+        name = label(definition.map_path or definition.opacity_path, "map_Kd")
+        self.textures.append(Texture(name.replace("\\", "/"), texels, wrap, wrap, opacity))
         return len(self.textures) - 1
+
+    def _image(self, named: str, keyword: str, decode: Callable[[bytes, str], _Image]) -> _Image | None:
+        """An image of the scene's folder; None, to be said later, where it cannot be read."""
+        if not named:
+            return None
+        path = named.replace("\\", "/")
+        try:
+            content = self._folder.read(path, keyword)
+        except SceneFileError:
+            self._missing_maps.append(named)
+            return None
+        return decode(content, f"{keyword} {path!r:.80}")
+
+    def _opacity(self, content: bytes, where: str) -> UInt8[np.ndarray, "height width"]:
+        """The alpha of an image that has one, else its brightness."""
+        alpha = self._decoder.opacity(content, where)
+        return self._decoder.decode(content, where)[..., 0] if alpha is None else alpha
 
     def _read_once(self, name: str) -> bool:
         """Whether a library can be read. It is read where it is first named."""
@@ -220,10 +258,13 @@ class MtlMaterials:
             definition.opacity = _leading_number(rest.removeprefix("-halo"), 1.0)
         elif keyword == "Tr" and definition.opacity is None:
             definition.opacity = 1.0 - _leading_number(rest, 0.0)
-        elif keyword in ("map_d", "map_Tr"):
+        elif keyword == "Pm":
+            definition.metallic = min(max(_leading_number(rest, 0.0), 0.0), 1.0)
+        elif keyword == "map_d":
+            definition.opacity_path = map_statement(rest).path
+        elif keyword == "map_Tr":
             self._warnings.tally(
-                "1 material has an opacity map; it is drawn opaque",
-                "{n} materials have opacity maps; they are drawn opaque",
+                "1 material has a map_Tr, which is ignored", "{n} materials have a map_Tr, which is ignored"
             )
 
     def _color(self, rest: str, where: str) -> Float32[np.ndarray, "3"]:

@@ -1,14 +1,16 @@
 """The diffuse part of Mitsuba's materials."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64, UInt8
 
-from vpltune.renderer.files.srgb import srgb_from_linear
+from vpltune.renderer.files.srgb import linear_from_srgb, srgb_from_linear
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, label
 from vpltune.renderer.scene.files.image_texels import MTL_FORMATS, ImageDecoder
+from vpltune.renderer.scene.files.opacity import say_blended, without_idle_alpha
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
+from vpltune.renderer.scene.files.texel_products import of_size
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
 from vpltune.renderer.scene.scene import Material, Texture, Wrap
 
@@ -29,15 +31,6 @@ _DIFFUSE_NAMES = {
 }
 # Materials without a diffuse part; their surfaces are removed.
 _GLASS = ("dielectric", "thindielectric", "roughdielectric", "null")
-# Reflectance of metals at normal incidence, linear Rec. 709.
-_METALS = {
-    "none": (1.0, 1.0, 1.0),
-    "Ag": (0.96, 0.95, 0.92),
-    "Al": (0.91, 0.92, 0.92),
-    "Au": (0.94, 0.78, 0.37),
-    "Cr": (0.55, 0.56, 0.55),
-    "Cu": (0.93, 0.72, 0.50),
-}
 # A choice: side of a checkerboard image in texels. Bilinear filtering blurs its edges by one texel.
 _CHECKER_TEXELS = 64
 
@@ -93,19 +86,15 @@ class MaterialReader:
             return None
         if bsdf.type in ("conductor", "roughconductor"):
             self._warnings.tally(
-                "1 metal is drawn as diffuse, with its reflectance at normal incidence",
-                "{n} metals are drawn as diffuse, with their reflectance at normal incidence",
+                "1 metal is drawn black: its reflections are not drawn",
+                "{n} metals are drawn black: their reflections are not drawn",
             )
-            return self._add(name, self._metal(bsdf), None)
+            return self._add(name, np.zeros(3), None)
         if bsdf.type in ("blendbsdf", "mixturebsdf"):
             return self._blend(bsdf)
         if bsdf.type not in _DIFFUSE_NAMES:
             raise SceneFileError(f"{bsdf.where}: unsupported material type")
-        if _is_metallic(bsdf):
-            self._warnings.tally(
-                "1 principled material is metallic, which is drawn as matt",
-                "{n} principled materials are metallic, which is drawn as matt",
-            )
+        matt = 1.0 - self._metallic(bsdf)
         if bsdf.type not in ("diffuse", "roughdiffuse"):
             self._warnings.tally(
                 "1 material has gloss, which is ignored; its diffuse part is kept",
@@ -114,32 +103,61 @@ class MaterialReader:
         key = _DIFFUSE_NAMES[bsdf.type]
         texture = bsdf.child(key)
         if texture is None or texture.kind != "texture":
-            return self._add(name, bsdf.vector(key, (0.5, 0.5, 0.5)), None)
-        return self._textured(name, texture, np.ones(3))
+            return self._add(name, matt * bsdf.vector(key, (0.5, 0.5, 0.5)), None)
+        return self._textured(name, texture, np.full(3, matt))
 
     def _inner(self, bsdf: Plugin) -> Surfacing | None:
         inner = bsdf.of_kind("bsdf")
         if not inner:
             raise SceneFileError(f"{bsdf.where}: must contain a material")
         if bsdf.type == "mask":
-            self._warnings.tally(
-                "1 cut-out material is drawn opaque: its mask is ignored",
-                "{n} cut-out materials are drawn opaque: their masks are ignored",
-            )
-        elif bsdf.type != "twosided":
+            return self._masked(bsdf, self.surfacing(inner[0]))
+        if bsdf.type != "twosided":
             self._warnings.add(f"{bsdf.type}: bumps and coatings are ignored; the material beneath is used")
         return self.surfacing(inner[0])
 
-    def _metal(self, bsdf: Plugin) -> Float64[np.ndarray, "3"]:
-        tint = bsdf.vector("specular_reflectance", (1.0, 1.0, 1.0))
-        if "eta" in bsdf.values or "k" in bsdf.values:
-            eta, k = bsdf.vector("eta", (0.0, 0.0, 0.0)), bsdf.vector("k", (1.0, 1.0, 1.0))
-            # Fresnel reflectance of a conductor at normal incidence in air.
-            return tint * ((eta - 1.0) ** 2 + k**2) / ((eta + 1.0) ** 2 + k**2)
-        metal = bsdf.text("material", "none")
-        if metal not in _METALS:
-            self._warnings.add(f"metal {label(metal, '?')} is unknown: a grey reflectance of 0.6 is used")
-        return tint * np.array(_METALS.get(metal, (0.6, 0.6, 0.6)))
+    def _masked(self, mask: Plugin, inner: Surfacing | None) -> Surfacing | None:
+        """A material that stops the share `opacity` of the light, a number or the image of a bitmap."""
+        if inner is None:
+            return None
+        material = self.materials[inner.material]
+        texture = None if material.texture is None else self.textures[material.texture]
+        number, to_uv = 1.0, inner.to_uv
+        opacity = mask.child("opacity")
+        if opacity is None or opacity.kind != "texture":
+            number = min(max(float(mask.vector("opacity", (0.5, 0.5, 0.5)).mean()), 0.0), 1.0)
+        elif opacity.type != "bitmap" or (texture is not None and not np.allclose(_to_uv(opacity), to_uv)):
+            self._warnings.add(
+                "mask: an opacity that is no bitmap, or placed otherwise than the colour, is ignored"
+            )
+            return inner
+        else:
+            # `_texels` holds plain numbers encoded too.
+            linear = linear_from_srgb(self._texels(opacity)[..., 0] / 255.0)
+            plane, to_uv = np.round(255.0 * linear).astype(np.uint8), _to_uv(opacity)
+            texture = _with_opacity(texture, plane, self._images, mask.where)
+            self.textures.append(texture)
+        index = None if texture is None else material.texture if number < 1.0 else len(self.textures) - 1
+        masked = replace(material, texture=index, alpha_mode="blend", opacity=number)
+        masked = without_idle_alpha(masked, texture)
+        say_blended(masked, self._warnings)
+        self.materials.append(masked)
+        return Surfacing(len(self.materials) - 1, to_uv)
+
+    def _metallic(self, bsdf: Plugin) -> float:
+        """Metalness in [0, 1] of a principled material; 0 for all others."""
+        if bsdf.type != "principled":
+            return 0.0
+        if bsdf.child("metallic") is not None:
+            self._warnings.add("principled: a texture of metalness is ignored; the material is drawn matt")
+            return 0.0
+        metallic = min(max(bsdf.number("metallic", 0.0), 0.0), 1.0)
+        if metallic > 0.0:
+            self._warnings.tally(
+                "1 material is metallic; its diffuse part is drawn, its reflections are not",
+                "{n} materials are metallic; their diffuse parts are drawn, their reflections are not",
+            )
+        return metallic
 
     def _blend(self, bsdf: Plugin) -> Surfacing | None:
         inner = bsdf.of_kind("bsdf")
@@ -208,11 +226,17 @@ class MaterialReader:
         return Surfacing(len(self.materials) - 1, np.eye(3) if to_uv is None else to_uv)
 
 
-def _is_metallic(bsdf: Plugin) -> bool:
-    # A plastic may have a child of that name too; Mitsuba has no use for it.
-    return bsdf.type == "principled" and (
-        bsdf.child("metallic") is not None or bsdf.number("metallic", 0.0) > 0.0
-    )
+def _with_opacity(
+    texture: Texture | None, plane: UInt8[np.ndarray, "height width"], images: ImageDecoder, where: str
+) -> Texture:
+    """The texture, or white, with an opacity; both in the larger size of the two."""
+    sizes = [plane.shape] if texture is None else [plane.shape, texture.texels_srgb.shape[:2]]
+    height, width = np.max(sizes, axis=0).tolist()
+    images.spend(width * height, f"its texels of {width} × {height}", where)
+    opacity = of_size(plane, width, height)
+    if texture is None:
+        return Texture("mask", np.full((height, width, 3), 255, np.uint8), opacity=opacity)
+    return replace(texture, texels_srgb=of_size(texture.texels_srgb, width, height), opacity=opacity)
 
 
 def _to_uv(texture: Plugin) -> Float64[np.ndarray, "3 3"]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int64
 
+from vpltune.renderer.scene.panes import is_pane
 from vpltune.renderer.scene.placement.triangle_albedo import triangle_albedo
 from vpltune.renderer.scene.scene import Scene, transform_points
 
@@ -37,10 +38,12 @@ class PlacedTriangles:
 
 
 def placed_triangles(scene: Scene) -> PlacedTriangles:
-    """All triangles of all instances."""
+    """All triangles of all instances but panes; of panes too, where a scene has nothing else."""
+    panes = [is_pane(scene, mesh) for mesh in scene.meshes]
+    shown = [instance for instance in scene.instances if not panes[instance.mesh]] or scene.instances
     corners, albedo = [np.zeros((0, 3, 3))], [np.zeros((0, 3), np.float32)]
     colors = [triangle_albedo(scene, mesh) for mesh in scene.meshes]
-    for instance in scene.instances:
+    for instance in shown:
         mesh = scene.meshes[instance.mesh]
         placed = transform_points(instance.to_world, mesh.positions)[mesh.triangles]
         corners.append(placed[:, ::-1] if np.linalg.det(instance.to_world[:3, :3]) < 0.0 else placed)

@@ -1,6 +1,7 @@
 """A scene written as .glb and read back is the same scene."""
 
 import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,13 +27,22 @@ def _rich_scene() -> Scene:
     texels = random.integers(0, 256, (5, 3, 3)).astype(np.uint8)
     return Scene(
         name="rich",
-        meshes=(plain, coloured),
-        instances=(Instance("a", 0, np.eye(4)), Instance("b", 1, turned), Instance("c", 0, turned @ turned)),
+        meshes=(plain, coloured, replace(coloured, name="holed", material=2)),
+        instances=(
+            Instance("a", 0, np.eye(4)),
+            Instance("b", 1, turned),
+            Instance("c", 0, turned @ turned),
+            Instance("d", 2, turned),
+        ),
         materials=(
             Material("one", np.float32([1.0 / 3.0, 0.0, 1.0])),
             Material("two", np.float32([0.1, 0.2, 0.3]), 0),
+            Material("holes", np.float32([0.1, 0.2, 0.3]), 1, "mask", 0.75, 0.25),
         ),
-        textures=(Texture("noise", texels, "mirrored_repeat", "clamp_to_edge"),),
+        textures=(
+            Texture("noise", texels, "mirrored_repeat", "clamp_to_edge"),
+            Texture("holes", texels, opacity=random.integers(0, 256, (5, 3)).astype(np.uint8)),
+        ),
         lights=(
             Light(
                 "spot",
@@ -67,8 +77,13 @@ def test_everything_comes_back(tmp_path, scene):
     for mine, other in zip(scene.materials, read.materials, strict=True):
         np.testing.assert_array_equal(mine.base_color, other.base_color)
         assert mine.texture == other.texture
+        assert (mine.alpha_mode, mine.opacity) == (other.alpha_mode, other.opacity)
+        assert mine.is_opaque or mine.alpha_cutoff == other.alpha_cutoff
     for mine, other in zip(scene.textures, read.textures, strict=True):
         np.testing.assert_array_equal(mine.texels_srgb, other.texels_srgb)
+        assert (mine.opacity is None) == (other.opacity is None)
+        if mine.opacity is not None:
+            np.testing.assert_array_equal(mine.opacity, other.opacity)
         assert (mine.wrap_u, mine.wrap_v) == (other.wrap_u, other.wrap_v)
     for mine, other in zip(scene.cameras, read.cameras, strict=True):
         np.testing.assert_allclose(mine.to_world, other.to_world, atol=1e-14)

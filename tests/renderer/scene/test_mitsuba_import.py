@@ -236,7 +236,15 @@ def test_what_cannot_be_brought_over_is_said(tmp_path):
         '<emitter type="constant"/><medium type="homogeneous"/>'
     )
     said = "\n".join(read_mitsuba(scene_file(tmp_path, more=more)).warnings)
-    for part in ("glass or empty", "cut-out", "gloss", "metal", "constant environment", "media", "no light"):
+    for part in (
+        "glass or empty",
+        "see-through",
+        "gloss",
+        "metal",
+        "constant environment",
+        "media",
+        "no light",
+    ):
         assert part in said, part
 
 

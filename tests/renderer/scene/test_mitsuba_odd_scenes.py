@@ -3,7 +3,9 @@
 import math
 import time
 
+import numpy as np
 import pytest
+from PIL import Image
 from reading_cost import MITSUBA, check_cost
 
 from vpltune.renderer.errors import InputError
@@ -144,23 +146,42 @@ def test_a_beam_wider_than_its_cutoff_is_refused(tmp_path):
         read(tmp_path, CUBE + spot)
 
 
-METALLIC_MAP = '<texture type="checkerboard" name="metallic"/>'
-
-
-@pytest.mark.parametrize(
-    ("kind", "metallic", "is_said"),
-    [
-        ("principled", '<float name="metallic" value="0"/>', False),
-        ("principled", '<float name="metallic" value="0.8"/>', True),
-        ("principled", METALLIC_MAP, True),
-        ("plastic", METALLIC_MAP, False),
-    ],
-)
-def test_a_metallic_material_is_said(tmp_path, kind, metallic, is_said):
-    """A principled one: no other is metallic, whatever it is given."""
-    bsdf = f'<bsdf type="{kind}">{metallic}</bsdf>'
+@pytest.mark.parametrize("metallic", [0.0, 0.75])
+def test_a_metallic_material_has_its_diffuse_part(tmp_path, metallic):
+    bsdf = f'''<bsdf type="principled"><rgb name="base_color" value="0.8 0.4 0.2"/>
+      <float name="metallic" value="{metallic}"/></bsdf>'''
     scene = read(tmp_path, f'<shape type="cube">{bsdf}</shape>')
-    assert ("1 principled material is metallic, which is drawn as matt" in scene.warnings) is is_said
+    said = "1 material is metallic; its diffuse part is drawn, its reflections are not"
+    assert (said in scene.warnings) is (metallic > 0.0)
+    np.testing.assert_allclose(
+        scene.materials[0].base_color, (1.0 - metallic) * np.array([0.8, 0.4, 0.2]), rtol=1e-6
+    )
+
+
+def test_a_mask_stops_its_share(tmp_path):
+    inner = '<bsdf type="diffuse"><rgb name="reflectance" value="0.25"/></bsdf>'
+    bsdf = f'<bsdf type="mask"><float name="opacity" value="0.75"/>{inner}</bsdf>'
+    scene = read(tmp_path, f'<shape type="cube">{bsdf}</shape>')
+    material = scene.materials[scene.meshes[0].material]
+    assert (material.alpha_mode, material.opacity) == ("blend", 0.75)
+    np.testing.assert_array_equal(material.base_color, 0.25)
+
+
+def test_a_mask_may_be_an_image(tmp_path):
+    Image.fromarray(np.array([[0, 51, 255]], np.uint8)).save(tmp_path / "m.png")
+    image = """<texture name="opacity" type="bitmap"><string name="filename" value="m.png"/>
+      <boolean name="raw" value="true"/></texture>"""
+    bsdf = f'<bsdf type="mask">{image}<bsdf type="diffuse"/></bsdf>'
+    scene = read(tmp_path, f'<shape type="cube">{bsdf}</shape>')
+    material = scene.materials[scene.meshes[0].material]
+    np.testing.assert_array_equal(scene.textures[material.texture].opacity, [[0, 51, 255]])
+    assert (material.alpha_mode, material.opacity) == ("blend", 1.0)
+
+
+def test_a_conductor_reflects_no_diffuse_light(tmp_path):
+    scene = read(tmp_path, '<shape type="cube"><bsdf type="roughconductor"/></shape>')
+    assert "1 metal is drawn black: its reflections are not drawn" in scene.warnings
+    np.testing.assert_array_equal(scene.materials[0].base_color, 0.0)
 
 
 def test_why_no_triangle_is_left_is_said(tmp_path):

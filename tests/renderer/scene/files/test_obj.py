@@ -90,6 +90,37 @@ def test_materials_textures_and_coordinates(tmp_path):
     assert scene.warnings == ()
 
 
+def test_a_metal_has_its_diffuse_part(tmp_path):
+    (tmp_path / "a.mtl").write_text("newmtl a\nKd 0.8 0.4 0.2\nPm 0.75\n")
+    scene = read_text(tmp_path, "mtllib a.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\n")
+    np.testing.assert_allclose(scene.materials[0].base_color, [0.2, 0.1, 0.05], rtol=1e-6)
+    assert scene.warnings == ("1 material is metallic; its diffuse part is drawn, its reflections are not",)
+
+
+@pytest.mark.parametrize(
+    ("statement", "opacity"), [("d 0.25", 0.25), ("Tr 0.75", 0.25), ("d -halo 0.5", 0.5)]
+)
+def test_a_dissolved_material_stops_its_share(tmp_path, statement, opacity):
+    (tmp_path / "a.mtl").write_text(f"newmtl a\nKd 0.8 0.4 0.2\n{statement}\n")
+    scene = read_text(tmp_path, "mtllib a.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\n")
+    assert (scene.materials[0].alpha_mode, scene.materials[0].opacity) == ("blend", opacity)
+    assert "1 material is see-through" in scene.warnings[0]
+
+
+@pytest.mark.parametrize("has_color", [True, False])
+def test_an_opacity_map_is_alpha_or_brightness(tmp_path, has_color):
+    Image.fromarray(np.array([[0, 255], [51, 102]], np.uint8)).save(tmp_path / "hole map.png")
+    Image.new("RGB", (1, 1), (9, 8, 7)).save(tmp_path / "c.png")
+    color = "map_Kd c.png\n" if has_color else ""
+    (tmp_path / "a.mtl").write_text(f"newmtl a\n{color}map_d hole map.png\n")
+    scene = read_text(tmp_path, "mtllib a.mtl\n" + SQUARE + "vt 0 0\nusemtl a\nf 1/1 2/1 3/1\n")
+    (texture,) = scene.textures
+    np.testing.assert_array_equal(texture.opacity, [[0, 255], [51, 102]])
+    np.testing.assert_array_equal(texture.texels_srgb[0, 0], [9, 8, 7] if has_color else [255] * 3)
+    assert texture.texels_srgb.shape == (2, 2, 3)
+    assert scene.materials[0].is_blended
+
+
 def test_missing_textures_and_libraries_are_said(tmp_path):
     (tmp_path / "a.mtl").write_text(
         "newmtl a\nmap_Kd no.png\nnewmtl b\nKd .5 .5 .5\nmap_Kd C:\\gone\\no.png\n"

@@ -89,7 +89,9 @@ def test_comments_after_numbers_are_no_colours(tmp_path):
 def test_a_see_through_material_is_said(tmp_path, line):
     (tmp_path / "a.mtl").write_text(f"newmtl a\nKd .5 .5 .5\n{line}\nnewmtl unused\nd 0.1\n")
     scene = read_bytes(tmp_path, "mtllib a.mtl\nusemtl a\n" + TRIANGLE + "f 1 2 3\n")
-    assert scene.warnings == ("1 material is see-through (d, Tr); it is drawn opaque",)
+    assert scene.warnings == (
+        "1 material is see-through: light passes by its share, the camera sees it if half opaque or more",
+    )
 
 
 @pytest.mark.parametrize("lines", ["d 1.0", "Tr 0", "d 1\nTr 1", "Tr 1\nd 1", "d odd", "d nan", "Tr nan"])

@@ -299,7 +299,8 @@ def _validated(
 ) -> tuple[Verdict | None, tuple[str, ...]]:
     """The choice on the validation views, None with fewer than two lit ones, and the reasons not to judge by
     them."""
-    auto = auto_candidate(prepared, start, options.start)
+    # With a loss of one's own, only what minimises it may take the start's place.
+    auto = None if options.loss is not None else auto_candidate(prepared, start, options.start)
     tried = candidates(start.parameters, found.base, found.tuned, auto)
     # The identity, which the runtime draws with, and rotations that the density was not fitted to.
     rotations = table_rotations(VALIDATION_ROTATIONS - 1, options.seed, held_out=True)

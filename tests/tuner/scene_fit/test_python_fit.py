@@ -22,7 +22,8 @@ SMALL = (24, 18)
 
 
 def log_error(predicted, reference):
-    return jnp.mean(jnp.log((predicted + 1e-3) / (reference + 1e-3)) ** 2)
+    dark = 0.01 * reference.mean()
+    return jnp.mean(jnp.log((predicted + dark) / (reference + dark)) ** 2)
 
 
 def own_views():
@@ -69,19 +70,22 @@ def test_a_loss_of_ones_own_is_what_the_fit_minimises(tmp_path, monkeypatch):
     assert result.document["views"] is None
     assert result.document["loss"]["function"] == "log_error"
     assert result.document["uncertainty"] == {}
-    assert result.descent.loss < 0.5 * result.descent.start_loss
+    assert result.descent.loss < 0.9 * result.descent.start_loss
     moved = {"intensity", "falloff_footprint", "extinction_coefficient"}
     start, fitted = START.parameters.as_dict(), result.fitted.as_dict()
     assert {name for name in start if start[name] != fitted[name]} <= moved
     assert result.fitted.intensity == pytest.approx(1.0, abs=0.15)
     # The guard judged it by its own measures, which an intensity that far off is clear in.
     assert result.status == "improved"
-    assert {each["name"] for each in result.document["validation"]["candidates"]} >= {"tuned", "halfway"}
+    assert [each["name"] for each in result.document["validation"]["candidates"]] == ["halfway", "tuned"]
 
 
 @pytest.mark.slow
 def test_a_loss_that_the_measures_contradict_is_not_accepted():
-    """The darkest image has the least of this loss: the start is kept, and `fitted` has what was found."""
+    """The darkest image has the least of this loss: the start is kept, and `fitted` has what was found.
+
+    Nor does the learnt prior take the start's place, which knows nothing of the loss.
+    """
     result = vpltune.fit(
         colored_room(), views=own_views(), config=START, loss=lambda predicted, reference: predicted.mean()
     )

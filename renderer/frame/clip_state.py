@@ -4,9 +4,10 @@ import moderngl
 
 
 class ClipState:
-    """Clustered discs and the eased parameters of an `auto` config. Make one for each clip, none for stills.
+    """Discs, their importance, and the eased parameters of an `auto` config. Make one for each clip.
 
-    All of it is on the GPU. Lloyd iterations start from the discs of the frame before, which flickers less.
+    All of it is on the GPU. Lloyd iterations start from the discs of the frame before, and importance stays
+    while it is near that of this frame. Both flicker less.
 
     It stays with the OpenGL context that it was first drawn on.
 

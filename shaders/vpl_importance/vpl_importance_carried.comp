@@ -1,5 +1,5 @@
-// VPL importance, part 5, in a clip alone: keeps the importance factors F of the frame before while they will do. One
-// workgroup.
+// VPL importance, part 5, in a clip whose lights stand still: keeps the importance factors F of the frame before while they
+// will do. One workgroup.
 //
 // F is measured at few receivers, which move with the camera. So it differs a little in every frame, and the clusters of
 // samples drawn with it change. The light is right with any F; only its error grows as F becomes stale. So F stays as it
@@ -15,7 +15,7 @@
 layout(local_size_x = 256) in;
 
 layout(std430, binding = CARRIED_IMPORTANCE_BINDING) buffer CarriedImportance {
-    float carried_importance[];  // as `vpl_importance`; 0 before the clip's first frame
+    float carried_importance[];  // as `vpl_importance`
 };
 
 uniform int cell_count;
@@ -48,8 +48,7 @@ void main() {
         lag.x += 0.5 * importance_cells[i].position_flux.w * abs(density.x - density.y);
     }
     lag = summed(lane, lag);
-    // The total is 0 where the clip begins.
-    bool kept = total.y > 0.0 && lag.x <= LARGEST_LAG;
+    bool kept = lag.x <= LARGEST_LAG;
     for (int i = lane; i < cell_count; i += 256) {
         if (kept) {
             vpl_importance[i] = carried_importance[i];

@@ -12,7 +12,9 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.clip_state import ClipState
 from vpltune.renderer.frame.passes.vpl_importance import LARGEST_LAG
 from vpltune.renderer.frame.runtime import DrawnFrame, Runtime
+from vpltune.renderer.scene.light_faces import light_records
 from vpltune.renderer.scene.scene import look_at
+from vpltune.renderer.scene.sun_faces import SunGrid
 from vpltune.renderer.scene.views import View
 
 SIZE = (32, 24)
@@ -100,16 +102,29 @@ def test_cuts_are_followed_in_their_first_frame(room):
         np.testing.assert_array_equal(factors(room.draw(cut, discs(1.0), state))[0], still)
 
 
-def test_lights_may_come_and_go(room):
-    """Through a dark frame, and with other numbers of faces: the clip stays near a still, as above."""
-    state = ClipState()
-    for light in ("spot", None, "spot", "point", "wide_spot", "spot", "directional"):
-        view = seen_from(0.0, light) if light else replace(seen_from(0.0), lights=())
-        still, flux = factors(room.draw(view, discs(1.0)))
-        clip, _ = factors(room.draw(view, discs(1.0), state))
-        assert np.isfinite(clip).all()
-        if light:
-            assert lag(clip, still, flux) <= LARGEST_LAG + 1e-5
+def test_lights_that_move_or_come_and_go_are_followed(room):
+    """Also through a dark frame, and with other numbers of faces: F is that of a still, to the last bit.
+
+    F belongs to cells of the RSM, which move with their light. So it is measured anew while lights move.
+    """
+    state, spot = ClipState(), ROOM_LIGHTS["spot"]
+    moved = replace(spot, position_world=spot.position_world + np.array([0.01, 0.0, 0.0]))
+    others = (ROOM_LIGHTS[kind] for kind in ("point", "wide_spot", "spot", "directional"))
+    for lights in ((spot,), (moved,), (), (moved,), *((each,) for each in others)):
+        view = replace(seen_from(0.0), lights=lights)
+        still, _ = factors(room.draw(view, discs(1.0)))
+        np.testing.assert_array_equal(factors(room.draw(view, discs(1.0), state))[0], still)
+
+
+def test_a_sun_stands_still_while_its_finer_faces_follow_the_eye():
+    """They go with the camera by whole texels, over large ground; the light is the same."""
+    sun, state = ROOM_LIGHTS["directional"], ClipState()
+    bounds = np.array([[-50.0, 0.0, -50.0], [50.0, 4.0, 50.0]])
+    here, there = (light_records((sun,), bounds, SunGrid(128, (x, 1.0, 0.0), 2, None)) for x in (0.0, 9.0))
+    assert not np.array_equal(here.faces, there.faces)
+    turned = replace(sun, direction_world=np.array([0.48, -0.64, -0.6]))
+    moved = light_records((turned,), bounds, SunGrid(128, (9.0, 1.0, 0.0), 2, None))
+    assert [state.lights_stand_still(each) for each in (here, there, moved)] == [False, True, False]
 
 
 def test_a_moving_camera_does_not_stir_the_light(room):

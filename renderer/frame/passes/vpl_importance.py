@@ -93,7 +93,8 @@ class VplImportancePass(FramePass):
     def draw(self, inputs: FrameInputs) -> None:
         """Measure the importance of the light in the RSM, and mix it with its flux.
 
-        A clip keeps the result of the frame before until it is more than `LARGEST_LAG` away from this one.
+        While lights stand still, a clip keeps the result of the frame before until it is more than
+        `LARGEST_LAG` away from this one. Under a light that moves, kept cells would move samples with it.
         """
         uniforms = {**inputs.camera.uniforms, **self._rsm.uniforms, "cell_count": self._cell_count}
         groups = -(-self._cell_count // 64)
@@ -105,4 +106,7 @@ class VplImportancePass(FramePass):
             name, size = f"vpl_importance_{self._cell_count}", 4 * max(1, self._cell_count)
             carried = inputs.state.buffer(self._resources.context, name, size)
             self._resources["carried_importance"] = carried
-            self._carried.dispatch(1, cell_count=self._cell_count)
+            if inputs.state.lights_stand_still(inputs.records):
+                self._carried.dispatch(1, cell_count=self._cell_count)
+            else:
+                self._resources.copy("vpl_importance", "carried_importance")

@@ -25,6 +25,9 @@ important."""
 LEAST_IMPORTANCE = 0.05
 """Least share of the VPLs that is drawn by flux alone, whatever η is. Light that seems to matter little is
 drawn seldom, but never not at all, so that the mean stays right and no VPL grows too bright. A choice."""
+LARGEST_LAG = 0.1
+"""Share of the VPLs that a clip may draw elsewhere than a still of the same frame. The larger, the rarer is a
+new importance, which shows as one change. A choice (docs/design_decisions.md, Placement)."""
 DEFINES = {
     "IMPORTANCE_RECEIVERS": RECEIVERS,
     "IMPORTANCE_SPREAD": SPREAD,
@@ -56,34 +59,54 @@ class VplImportancePass(FramePass):
     name = "vpl_importance"
 
     def __init__(self, resources: Resources, rsm: ReflectiveShadowMap, cells: int):
+        self._resources = resources
         self._rsm = rsm
         self._cell_count = rsm.face_count * cells**2
         context, count = resources.context, max(1, self._cell_count)
         resources["importance_cells"] = context.buffer(reserve=count * _CELL_BYTES)
         resources["importance_receivers"] = context.buffer(reserve=RECEIVERS * _RECEIVER_BYTES)
         resources["vpl_importance"] = context.buffer(reserve=count * 4)
-        defines = {**DEFINES, "RSM_RESOLUTION": rsm.resolution, "IMPORTANCE_CELLS": cells}
+        defines = {
+            **DEFINES,
+            "RSM_RESOLUTION": rsm.resolution,
+            "IMPORTANCE_CELLS": cells,
+            "LARGEST_LAG": LARGEST_LAG,
+        }
 
-        def program(stage: str, reads: tuple[str, ...], writes: str) -> ComputeProgram:
+        def program(stage: str, reads: tuple[str, ...], *writes: str) -> ComputeProgram:
             return ComputeProgram(
-                resources, f"vpl_importance/vpl_importance{stage}", defines, reads=reads, writes=(writes,)
+                resources, f"vpl_importance/vpl_importance{stage}", defines, reads=reads, writes=writes
             )
 
         measured = ("importance_cells", "importance_receivers")
         self._cells = program("_cells", (*RSM_READS, "importance_receivers"), "importance_cells")
         self._receivers = program("_receivers", (*GBUFFER_READS, "importance_cells"), "importance_receivers")
-        self._importance = program("", ("artist_parameters", *RSM_READS, *measured), "vpl_importance")
-        self._factor = program("_factor", ("artist_parameters", *RSM_READS, *measured), "vpl_importance")
+        reads = ("artist_parameters", *RSM_READS, *measured)
+        self._importance = program("", reads, "vpl_importance")
+        self._factor = program("_factor", reads, "vpl_importance")
+        self._carried = program("_carried", reads, "vpl_importance", "carried_importance")
 
     def wanted(self, inputs: FrameInputs) -> bool:
         """Where the density heeds it."""
         return inputs.parameters.density_importance > 0.0
 
     def draw(self, inputs: FrameInputs) -> None:
-        """Measure the importance of the light in the RSM, and mix it with its flux."""
+        """Measure the importance of the light in the RSM, and mix it with its flux.
+
+        While lights stand still, a clip keeps the result of the frame before until it is more than
+        `LARGEST_LAG` away from this one. Under a light that moves, kept cells would move samples with it.
+        """
         uniforms = {**inputs.camera.uniforms, **self._rsm.uniforms, "cell_count": self._cell_count}
         groups = -(-self._cell_count // 64)
         self._cells.dispatch(groups, **uniforms)
         self._receivers.dispatch(RECEIVERS, **uniforms)
         self._importance.dispatch(groups, **uniforms)
         self._factor.dispatch(1, **uniforms)
+        if inputs.state is not None:
+            name, size = f"vpl_importance_{self._cell_count}", 4 * max(1, self._cell_count)
+            carried = inputs.state.buffer(self._resources.context, name, size)
+            self._resources["carried_importance"] = carried
+            if inputs.state.lights_stand_still(inputs.records):
+                self._carried.dispatch(1, cell_count=self._cell_count)
+            else:
+                self._resources.copy("vpl_importance", "carried_importance")

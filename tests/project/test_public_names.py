@@ -58,7 +58,6 @@ def test_what_notebooks_hold_is_taken_and_what_is_wrong_is_said():
         cwd=REPOSITORY,
         capture_output=True,
         text=True,
-        timeout=120,
         check=False,
     )
     assert done.returncode == 0, done.stderr

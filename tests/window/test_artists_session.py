@@ -1,12 +1,10 @@
 """A whole session in a real browser with real mouse and keys, against the real server, runtime and fit."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 from headless_chromium import headless_chromium
-from PIL import Image
 from playwright.sync_api import expect
 
 import vpltune
@@ -138,6 +136,3 @@ def test_drag_tune_compare_undo_save_reload_and_load(window, page, scene_file, t
     view = vpltune.View("main", "fitted", (shown.shape[1], shown.shape[0]), camera, lights)
     drawn = vpltune.Runtime(scene).render(view, vpltune.read_config(path))
     assert np.array_equal(shown, drawn)
-    assert len(list(screenshots.iterdir())) == 7
-    assert Image.open(screenshots / "4 tuned.png").size == (720, 420)
-    assert Path(path).exists()

@@ -45,7 +45,6 @@ class _Import:
     meshes: list[Mesh] = field(default_factory=list)
     instances: list[Instance] = field(default_factory=list)
     lights: list[tuple[Light, float]] = field(default_factory=list)
-    shapes: int = 0
     groups: dict[int, list[tuple[int, Float64[np.ndarray, "4 4"]]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -56,6 +55,7 @@ class _Import:
         root = plugin_tree(parse_xml(self.folder.read_scene_file(self.path)))
         for folder, where in root.search_paths:
             self.folder.search_first(folder, where, self.warnings)
+        _check_shape_count(root)
         for plugin in root.of_kind("shape"):
             if plugin.type == "shapegroup":
                 self.groups[id(plugin)] = [
@@ -94,9 +94,6 @@ class _Import:
 
     def _mesh(self, plugin: Plugin) -> tuple[int, Float64[np.ndarray, "4 4"]] | None:
         """Index of the shape's mesh and its transform to world; None if no surface is left."""
-        self.shapes += 1
-        if self.shapes > MAX_INSTANCES:
-            raise SceneFileError(f"{plugin.where}: a scene must have at most {MAX_INSTANCES:,} shapes")
         shape = shape_triangles(plugin, self.folder, self.warnings)
         if shape is None:
             self._warn_no_area()
@@ -209,6 +206,18 @@ class _Import:
         for _, plugin in root.children:
             if plugin.kind not in (*_SILENT, "shape", "emitter", "sensor", "medium"):
                 self.warnings.add(f"{plugin.where} is ignored")
+
+
+def _check_shape_count(root: Plugin) -> None:
+    """Refuse too many shapes before the first is read: each takes about 0.2 ms."""
+    shapes: list[Plugin] = []
+    for plugin in root.of_kind("shape"):
+        if plugin.type != "instance":
+            shapes += plugin.of_kind("shape") if plugin.type == "shapegroup" else [plugin]
+    if len(shapes) > MAX_INSTANCES:
+        raise SceneFileError(
+            f"{shapes[MAX_INSTANCES].where}: a scene must have at most {MAX_INSTANCES:,} shapes"
+        )
 
 
 def _vertical_angle(sensor: Plugin, width: float, height: float) -> float:

@@ -72,17 +72,23 @@ def guarded(command: Callable[[], int], name: str) -> int:
 
 
 @contextlib.contextmanager
-def asked_to_stop() -> Iterator[None]:
-    """While this lasts, a signal raises KeyboardInterrupt, and the command has `PATIENCE_SECONDS` to end."""
+def asked_to_stop(stop: Callable[[], None] | None = None) -> Iterator[None]:
+    """While this lasts, a signal calls `stop`, and the command has `PATIENCE_SECONDS` to end.
+
+    Args:
+        stop: called between two steps of the interpreter; None raises KeyboardInterrupt.
+    """
     if _pipe_to_guard is None:
         yield
         return
 
-    def stop(number: int, frame: FrameType | None) -> None:
+    def asked(number: int, frame: FrameType | None) -> None:
         signal.signal(signal.SIGUSR1, _ignored)
-        raise KeyboardInterrupt
+        if stop is None:
+            raise KeyboardInterrupt
+        stop()
 
-    before = signal.signal(signal.SIGUSR1, stop)
+    before = signal.signal(signal.SIGUSR1, asked)
     os.write(_pipe_to_guard, _ASKS + b"\0")
     try:
         yield

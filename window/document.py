@@ -66,6 +66,7 @@ class Document:
     _undone: list[_Step] = field(default_factory=list)
     _saved: TunedConfig | None = None
     _saved_lights: tuple[PlacedLight, ...] = ()
+    _saved_views: tuple[NamedView, ...] = ()
 
     def __post_init__(self) -> None:
         self.mark_saved()
@@ -125,6 +126,10 @@ class Document:
         """The lights are on disk as they stand."""
         self._saved_lights = self.now.lights
 
+    def mark_views_saved(self) -> None:
+        """The kept views are on disk as they stand."""
+        self._saved_views = self.now.kept
+
     @property
     def unsaved(self) -> bool:
         """Whether the config by hand draws other images than the one that was opened or saved last."""
@@ -137,6 +142,16 @@ class Document:
         return len(before) != len(now) or any(
             a.light is not b.light for a, b in zip(before, now, strict=True)
         )
+
+    @property
+    def unsaved_views(self) -> bool:
+        """Whether views were kept or removed since the window was opened or they were saved."""
+        return self.now.kept != self._saved_views
+
+    @property
+    def all_saved(self) -> bool:
+        """Whether nothing would be lost."""
+        return not (self.unsaved or self.unsaved_lights or self.unsaved_views)
 
 
 def with_parameter(edited: Edited, name: str, value: float | int) -> Edited:

@@ -19,7 +19,7 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import InputError, MachineError
 from vpltune.renderer.frame.clip_state import ClipState
 from vpltune.renderer.frame.runtime import Runtime
-from vpltune.renderer.scene.animation import AnimationPlayer
+from vpltune.renderer.scene.animation import AnimationPlayer, Pose
 from vpltune.renderer.scene.placement import resolve_camera_and_lights
 from vpltune.renderer.scene.placement.scene_sidecar import completed_camera_and_lights
 from vpltune.renderer.scene.scene import Light, Scene
@@ -163,10 +163,15 @@ class Drawing:
             self._posed = seconds
         if seconds is None:
             return lights
-        return tuple(
-            light if index is None else pose.lights[index]
-            for light, index in zip(lights, follows, strict=True)
-        )
+        return posed_lights(lights, follows, pose)
+
+
+def posed_lights(lights: tuple[Light, ...], follows: tuple[int | None, ...], pose: Pose) -> tuple[Light, ...]:
+    """The lights as a pose has those that follow one of the scene's; a scene read anew may have fewer."""
+    return tuple(
+        pose.lights[index] if index is not None and index < len(pose.lights) else light
+        for light, index in zip(lights, follows, strict=True)
+    )
 
 
 def lower_priority(steps: int) -> None:

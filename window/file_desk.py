@@ -99,7 +99,7 @@ class FileDesk:
         if left is None:
             return None
         before, after = ([light_to_json(each.light) for each in state.lights] for state in (now, left))
-        if left.config.draws_as(now.config) and before == after:
+        if left.config.draws_as(now.config) and before == after and not left.kept:
             self._recovery.forget()
             return None
         return left if before != after else replace(left, lights=now.lights)
@@ -122,7 +122,9 @@ class FileDesk:
             self._document.mark_saved()
         if what == "sidecar" and self._document.now.lights is now.lights:
             self._document.mark_lights_saved()
-        if not self._document.unsaved and not self._document.unsaved_lights:
+        if what == "views" and self._document.now.kept is now.kept:
+            self._document.mark_views_saved()
+        if self._document.all_saved:
             self._edited_at = None
             await asyncio.to_thread(self._recovery.forget)
         self._notify(line)
@@ -157,10 +159,10 @@ class FileDesk:
         if edited is None or time.monotonic() - edited < SECONDS_BETWEEN_LOOKS:
             return
         self._edited_at = None
-        if self._document.unsaved or self._document.unsaved_lights:
-            await asyncio.to_thread(self._recovery.keep, self._document.now)
-        else:
+        if self._document.all_saved:
             await asyncio.to_thread(self._recovery.forget)
+        else:
+            await asyncio.to_thread(self._recovery.keep, self._document.now)
 
     async def _config_changed(self, path: Path) -> None:
         try:

@@ -3,7 +3,6 @@
 import asyncio
 import atexit
 import html
-import multiprocessing
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from vpltune.renderer.scene.scene import Camera, Light, Scene
 from vpltune.window.requests import SceneSource
 from vpltune.window.server import ServerOptions, serve_window
 from vpltune.window.session import Session, WindowOptions
+from vpltune.window.spawned import spawned
 
 FRAME_HEIGHT = 720
 """Height of the frame in a notebook, in pixels. A choice: a laptop shows it whole."""
@@ -115,12 +115,8 @@ def view(
     else:
         raise InputError(f"{scene}: cannot be read (no such file)")
     options = WindowOptions(source, config, None if output is None else Path(output))
-    # Spawned: a fork would inherit the notebook's threads. It ends when the pipe to it is closed.
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    process = context.Process(target=_serve, args=(theirs, options, ServerOptions(host, port)))
-    process.start()
-    theirs.close()
+    # Not a daemon: it has processes of its own. It ends when the pipe to it is closed.
+    process, ours = spawned(_serve, (options, ServerOptions(host, port)), name="window", daemon=False)
     try:
         answer = ours.recv()
     except EOFError as error:

@@ -9,7 +9,7 @@ from vpltune.renderer.scene.animation import AnimationPlayer
 from vpltune.renderer.scene.scene import Instance, Scene
 from vpltune.tuner.reference import reference_views
 from vpltune.tuner.reference.reference_view import noise_floor
-from vpltune.window.drawing_process import lower_priority, serve
+from vpltune.window.drawing_process import lower_priority, posed_lights, serve
 from vpltune.window.reference_file import ReferenceImages, write_reference
 from vpltune.window.requests import ReferenceRequest, ReferenceStep, SceneSource
 
@@ -94,8 +94,5 @@ def _posed(scene: Scene, request: ReferenceRequest):
         Instance(each.name, each.mesh, matrix)
         for each, matrix in zip(scene.instances, pose.transforms, strict=True)
     )
-    lights = tuple(
-        light if index is None else pose.lights[index]
-        for light, index in zip(request.view.lights, request.follows, strict=True)
-    )
+    lights = posed_lights(request.view.lights, request.follows, pose)
     return replace(scene, instances=instances), replace(request.view, lights=lights)

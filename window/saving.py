@@ -12,8 +12,15 @@ from vpltune.renderer.files.atomic_file import write_text_whole, written_togethe
 from vpltune.renderer.files.image_file import require_extension
 from vpltune.renderer.scene.placement.sidecar_file import sidecar_path, sidecar_text
 from vpltune.renderer.scene.scene import Camera
-from vpltune.renderer.scene.views import View, light_from_json, light_to_json, write_views
-from vpltune.window.document import Edited, PlacedLight
+from vpltune.renderer.scene.views import (
+    View,
+    camera_from_json,
+    camera_to_json,
+    light_from_json,
+    light_to_json,
+    write_views,
+)
+from vpltune.window.document import Edited, NamedView, PlacedLight
 
 VIEW_SIZE = (960, 540)
 """Width and height of a saved view, in pixels; that of `vpltune render`."""
@@ -88,19 +95,20 @@ def save_views(path: Path, scene: str, camera: Camera, now: Edited) -> str:
 
 
 def recovery_text(now: Edited) -> str:
-    """Config and lights as one JSON document, for `recovered`."""
+    """Config, lights and kept views as one JSON document, for `recovered`."""
     document: dict[str, Any] = {
         "config": json.loads(config_text(now.config)),
         "lights": [
             {"follows": each.follows, "name": each.light.name, **light_to_json(each.light)}
             for each in now.lights
         ],
+        "kept": [{"name": each.name, "camera": camera_to_json(each.camera)} for each in now.kept],
     }
     return json.dumps(document, allow_nan=False)
 
 
 def recovered(text: str, where: str, now: Edited) -> Edited:
-    """The state that `recovery_text` wrote, with the views of `now`.
+    """The state that `recovery_text` wrote, in the place of `now`.
 
     Raises:
         InputError: the text is not what it wrote.
@@ -114,9 +122,13 @@ def recovered(text: str, where: str, now: Edited) -> Edited:
             )
             for each in document["lights"]
         )
+        kept = tuple(
+            NamedView(str(each["name"]), "kept", camera_from_json(each["camera"], where))
+            for each in document["kept"]
+        )
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputError(f"{where}: not a file of unsaved changes ({error})") from error
-    return replace(now, config=config, lights=lights)
+    return replace(now, config=config, lights=lights, kept=kept)
 
 
 def _counted(count: int, noun: str) -> str:

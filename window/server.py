@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import errno
 import itertools
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -103,9 +104,11 @@ async def _listening(server: ServerOptions, connected: Callable, requested: Call
             if error.errno == errno.EADDRINUSE and port != ports[-1]:
                 continue
             where = f"--host {server.host} --port {port}"
+            # asyncio's own text repeats address and port.
+            reason = os.strerror(error.errno) if error.errno in errno.errorcode else error.strerror
             if error.errno in (errno.EADDRINUSE, errno.EACCES):
-                raise InputError(f"{where}: cannot be listened on ({error.strerror})") from error
-            raise InputError(f"{where}: not an address of this machine ({error.strerror})") from error
+                raise InputError(f"{where}: cannot be listened on ({reason})") from error
+            raise InputError(f"{where}: not an address of this machine ({reason})") from error
     raise MachineError("there is no free port")
 
 

@@ -2,7 +2,6 @@
 
 import asyncio
 import functools
-import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -11,6 +10,7 @@ from typing import Any
 
 from vpltune.renderer.config.tuned_config import PRESETS, TunedConfig, read_config
 from vpltune.renderer.errors import InputError, MachineError
+from vpltune.renderer.files import unfinished_files
 from vpltune.renderer.scene.views import View, camera_from_json
 from vpltune.tuner.doctor.extras import how_to_install, missing_modules
 from vpltune.window import messages, wire
@@ -72,7 +72,7 @@ class Session:
         self.opened: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         """Done once the scene is there; holds the error if it cannot be used."""
         self.clients: dict[int, Client] = {}
-        self._folder = Path(tempfile.mkdtemp(prefix="vpltune-window-"))
+        self._folder = unfinished_files.new_folder(Path(tempfile.gettempdir()))
         self._crew = Crew(
             options.source,
             self._folder,
@@ -153,7 +153,7 @@ class Session:
         self._files.close()
         self._crew.close()
         self._fit.close()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        unfinished_files.ended(self._folder)
 
     # What browsers say.
 

@@ -108,6 +108,7 @@ def state_message(
         ],
         "unsaved": document.unsaved,
         "unsaved_lights": document.unsaved_lights,
+        "unsaved_views": document.unsaved_views,
         "can_undo": document.undo_name is not None,
         "can_redo": document.redo_name is not None,
         "undo_name": document.undo_name,

@@ -2,9 +2,10 @@
 
 import asyncio
 import contextlib
-import multiprocessing
 from collections.abc import Callable
 from typing import Any
+
+from vpltune.window.spawned import spawned
 
 
 class Worker:
@@ -26,16 +27,10 @@ class Worker:
         received: Callable[[Any], None],
         ended: Callable[[int | None], None],
     ):
-        # Spawned: a fork would inherit the server's threads and sockets.
-        context = multiprocessing.get_context("spawn")
-        self._connection, theirs = context.Pipe()
+        self._process, self._connection = spawned(target, arguments, name=name, daemon=True)
         self._received, self._ended = received, ended
         self._loop = asyncio.get_running_loop()
         self.name = name
-        self._process = context.Process(target=target, args=(theirs, *arguments), name=name, daemon=True)
-        self._process.start()
-        # Ours to close: the pipe ends when the process has closed its own end.
-        theirs.close()
         self._loop.add_reader(self._connection.fileno(), self._read)
         self._open = True
 

@@ -100,6 +100,7 @@ def state_message(**members: Any) -> dict[str, Any]:
         "views": [{"name": "door", "split": "kept", "camera": {**CAMERA, "yfov": 0.8}}],
         "unsaved": False,
         "unsaved_lights": False,
+        "unsaved_views": False,
         "can_undo": False,
         "can_redo": False,
         "undo_name": "",

@@ -104,6 +104,21 @@ def test_a_scene_that_changes_is_read_again_and_a_broken_one_is_not(talk, scene_
     assert np.array_equal(talk.shown().pixels, before)
 
 
+def test_kept_views_that_were_not_saved_come_back(own_cache, tmp_path, scene_file, config_file):
+    with vpltune.view(scene_file, config_file) as window, Talk(window.address) as talk:
+        talk.say("keep_view", name="close", camera=dict(talk.scene["camera"], yfov=0.5))
+        assert talk.message("state")["unsaved_views"]
+    with vpltune.view(scene_file, config_file) as window, Talk(window.address) as talk:
+        (view,) = (view for view in talk.state["views"] if view["split"] == "kept")
+        assert (view["name"], view["camera"]["yfov"]) == ("close", 0.5)
+        assert talk.state["unsaved_views"] and not talk.state["unsaved"]
+        talk.look()
+        talk.say("save", what="views", path=str(tmp_path / "views.json"))
+        assert not talk.message("state")["unsaved_views"]
+    with vpltune.view(scene_file, config_file) as window, Talk(window.address) as talk:
+        assert not talk.state["can_undo"]
+
+
 def test_changes_that_were_not_saved_come_back(own_cache, scene_file, config_file):
     with vpltune.view(scene_file, config_file) as window, Talk(window.address) as talk:
         talk.edit(gesture=1, parameter="intensity", value=7.0)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from vpltune.cli.options import SceneArgument
-from vpltune.cli.report import Report, warn
+from vpltune.cli.report import INTERRUPTED, Report, warn
 from vpltune.renderer.errors import InputError
 
 LOWEST_PORT = 1024
@@ -44,7 +44,7 @@ def view(
     """Open a window in the browser: look around, edit lights and parameters, tune, compare and save."""
     import asyncio
 
-    from vpltune.guard import asked_to_stop, last_line_printed
+    from vpltune.guard import asked_to_stop
     from vpltune.window.requests import SceneSource
     from vpltune.window.server import ServerOptions, serve_window
     from vpltune.window.session import WindowOptions
@@ -60,9 +60,16 @@ def view(
 
             webbrowser.open(address)
 
-    with asked_to_stop():
-        try:
-            asyncio.run(serve_window(window, ServerOptions(host, port), opened, lambda line: warn((line,))))
-        except KeyboardInterrupt:
-            last_line_printed()
+    async def serve() -> None:
+        loop, task = asyncio.get_running_loop(), asyncio.current_task()
+        assert task is not None, "asyncio runs this as a task"
+        # Raised in the midst of some other task, KeyboardInterrupt would be that one's failure.
+        with asked_to_stop(lambda: loop.call_soon_threadsafe(task.cancel)):
+            await serve_window(window, ServerOptions(host, port), opened, lambda line: warn((line,)))
+
+    try:
+        asyncio.run(serve())
+    except (asyncio.CancelledError, KeyboardInterrupt):
+        # The guard says which signal it was.
+        raise SystemExit(INTERRUPTED) from None
     return Report({"status": "ok"}, ())

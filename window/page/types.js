@@ -24,7 +24,7 @@
  * @typedef {{running: boolean, stage: string, share: number, seconds_left: number | null, losses: number[],
  *   parameters: Record<string, number> | null, status: string, sentence: string}} Fit
  * @typedef {{configs: Record<ConfigSource, Config | null>, lights: Light[], views: KeptView[],
- *   unsaved: boolean, unsaved_lights: boolean, can_undo: boolean, can_redo: boolean,
+ *   unsaved: boolean, unsaved_lights: boolean, unsaved_views: boolean, can_undo: boolean, can_redo: boolean,
  *   undo_name: string | null, redo_name: string | null, budget_ms: number | null, fit: Fit}} State
  * @typedef {{id: number, position: Vector | null, normal: Vector, distance: number}} Picked
  * @typedef {{source: Source, passes: [string, number][], milliseconds: number}} Timings

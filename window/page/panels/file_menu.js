@@ -11,6 +11,9 @@ import { byId, setText } from "../controls/elements.js";
 /** @type {What[]} */
 const FILES = ["config", "sidecar", "views"];
 
+const anyUnsaved = (/** @type {import("../types.js").State | null} */ state) =>
+  Boolean(state?.unsaved || state?.unsaved_lights || state?.unsaved_views);
+
 /** @param {Model} model @param {Edits} edits @param {Connection} connection
  * @returns {(what: What) => void} saves to the path in the menu */
 export function fileMenu(model, edits, connection) {
@@ -53,13 +56,14 @@ export function fileMenu(model, edits, connection) {
   });
   model.on(["scene", "state"], () => {
     const { scene, state } = model;
-    const unsaved = Boolean(state?.unsaved || state?.unsaved_lights);
+    const unsaved = anyUnsaved(state);
     document.title = `${unsaved ? "● " : ""}${scene ? `${scene.name} – ` : ""}VPLtune`;
     setText(byId("scene-name", HTMLElement), scene?.name ?? "");
     byId("scene-name", HTMLElement).title = scene?.path ?? scene?.name ?? "";
     byId("unsaved", HTMLElement).classList.toggle("on", unsaved);
     byId("unsaved-config", HTMLElement).hidden = !state?.unsaved;
     byId("unsaved-sidecar", HTMLElement).hidden = !state?.unsaved_lights;
+    byId("unsaved-views", HTMLElement).hidden = !state?.unsaved_views;
     for (const type of /** @type {const} */ (["undo", "redo"])) {
       const button = byId(type, HTMLButtonElement);
       const can = Boolean(type === "undo" ? state?.can_undo : state?.can_redo);
@@ -71,7 +75,7 @@ export function fileMenu(model, edits, connection) {
     }
   });
   addEventListener("beforeunload", (event) => {
-    if (model.state?.unsaved || model.state?.unsaved_lights) event.preventDefault();
+    if (anyUnsaved(model.state)) event.preventDefault();
   });
   return save;
 }

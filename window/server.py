@@ -105,7 +105,8 @@ async def _listening(server: ServerOptions, connected: Callable, requested: Call
                 continue
             where = f"--host {server.host} --port {port}"
             # asyncio's own text repeats address and port.
-            reason = os.strerror(error.errno) if error.errno in errno.errorcode else error.strerror
+            known = error.errno is not None and error.errno in errno.errorcode
+            reason = os.strerror(error.errno or 0) if known else error.strerror
             if error.errno in (errno.EADDRINUSE, errno.EACCES):
                 raise InputError(f"{where}: cannot be listened on ({reason})") from error
             raise InputError(f"{where}: not an address of this machine ({reason})") from error

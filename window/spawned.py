@@ -6,7 +6,6 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from types import ModuleType
 from typing import Any
@@ -17,7 +16,7 @@ MAIN = "__main__"
 
 def spawned(
     target: Callable[..., None], arguments: tuple[Any, ...], *, name: str, daemon: bool
-) -> tuple[SpawnProcess, Connection]:
+) -> tuple[SpawnProcess, Any]:
     """Start a process that calls `target`, and that SIGINT does not end.
 
     Args:

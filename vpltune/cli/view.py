@@ -63,8 +63,12 @@ def view(
     async def serve() -> None:
         loop, task = asyncio.get_running_loop(), asyncio.current_task()
         assert task is not None, "asyncio runs this as a task"
+
         # Raised in the midst of some other task, KeyboardInterrupt would be that one's failure.
-        with asked_to_stop(lambda: loop.call_soon_threadsafe(task.cancel)):
+        def end() -> None:
+            loop.call_soon_threadsafe(task.cancel)
+
+        with asked_to_stop(end):
             await serve_window(window, ServerOptions(host, port), opened, lambda line: warn((line,)))
 
     try:

@@ -38,6 +38,12 @@ DRACO_SECONDS = 1
 DRACO_BYTES_PER_SECOND = 1 << 18
 """A choice: further time for its length. Measured: 22 MB/s; a slow machine has a factor of eighty."""
 
+KTX2_SECONDS = 1
+"""A choice: processor time that decoding a KTX2 image may take whatever its size."""
+
+KTX2_TEXELS_PER_SECOND = 1 << 22
+"""A choice: further time for its texels. Measured: 90 million/s; a slow machine has a factor of twenty."""
+
 VERTEX_CHUNK = 1 << 18
 """A choice: vertices skinned at a time. It keeps the matrices of a large mesh below about 100 MiB."""
 

@@ -23,6 +23,9 @@ MAX_NODES = 1 << 17
 MAX_INSTANCES = 10_000
 """A choice. Each instance is a draw call in every pass."""
 
+MAX_PLACED_VERTICES = 1 << 27
+"""A choice: vertices of all instances, a mesh's once for each. Bounding that many takes 0.5 s."""
+
 MAX_CAMERAS = 10_000
 """A choice. Each takes about 30 µs to place."""
 
@@ -79,6 +82,9 @@ LARGEST_COORDINATE = 1e12
 
 LARGEST_NORMAL = 3.4e38
 """Largest component of a normal before it is scaled to unit length: any that float32 can hold."""
+
+LARGEST_UV = 1e9
+"""Largest texture coordinate. A choice: beyond 1e7, float32 cannot tell texels apart."""
 
 SMALLEST_EXTENT = 1e-12
 """Smallest diagonal of a scene in world units. A choice, like the largest coordinate."""

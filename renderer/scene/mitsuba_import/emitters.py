@@ -18,7 +18,7 @@ from jaxtyping import Float64
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
-from vpltune.renderer.scene.scene import Light
+from vpltune.renderer.scene.scene import Light, Mesh, cofactor_matrix
 from vpltune.renderer.scene.spot_cone import checked_cone
 
 # A choice: an emitter faces one direction if the vector sum of its triangles' areas is at least this share
@@ -47,29 +47,48 @@ class AreaEmitter:
     """Whether the shape's own surface encloses the light, and so must be removed."""
 
 
+@dataclass(frozen=True, eq=False)
+class Facets:
+    """What area emitters need of a mesh, in its own space."""
+
+    vectors: Float64[np.ndarray, "3 triangles"]
+    """Normals as long as the triangles are large, on the side where these wind counter-clockwise."""
+    centers: Float64[np.ndarray, "3 triangles"]
+    net: Float64[np.ndarray, "3"]
+    """The sum of the vectors."""
+
+
+def mesh_facets(mesh: Mesh) -> Facets:
+    """The facets of a mesh."""
+    first, second, third = (mesh.positions[mesh.triangles[:, i]].astype(np.float64) for i in range(3))
+    vectors = 0.5 * np.cross(second - first, third - first)
+    centers = (first + second + third) / 3.0
+    return Facets(np.ascontiguousarray(vectors.T), np.ascontiguousarray(centers.T), vectors.sum(axis=0))
+
+
 def area_emitter(
-    emitter: Plugin, corners_world: Float64[np.ndarray, "triangles 3 3"], outwards: float
+    emitter: Plugin, facets: Facets, to_world: Float64[np.ndarray, "4 4"], outwards: float
 ) -> AreaEmitter | None:
     """The punctual light that replaces an area emitter; None if the emitter is black or has no area.
 
     Args:
         emitter: the plugin, whose `radiance` is in W/(m²·sr).
-        corners_world: corners of the shape's triangles in world units.
+        facets: of the shape.
+        to_world: places them.
         outwards: 1 if light leaves the side on which the triangles wind counter-clockwise, −1 for the other.
 
     Raises:
         SceneFileError: the radiance is textured or not a colour.
     """
     radiance = _radiance(emitter)
-    vectors = np.cross(
-        corners_world[:, 1] - corners_world[:, 0], corners_world[:, 2] - corners_world[:, 0]
-    ) * (0.5 * outwards)
-    areas = np.linalg.norm(vectors, axis=1)
+    to_vector = cofactor_matrix(to_world)
+    vectors = to_vector @ facets.vectors
+    areas = np.sqrt(np.einsum("at,at->t", vectors, vectors))
     area = float(areas.sum())
     if not (area > 0.0 and radiance.any()):
         return None
-    center = (areas[:, None] * corners_world.mean(axis=1)).sum(axis=0) / area
-    net = vectors.sum(axis=0)
+    center = to_world[:3, :3] @ (facets.centers @ areas / area) + to_world[:3, 3]
+    net = outwards * (to_vector @ facets.net)
     facing = float(np.linalg.norm(net))
     flux = math.pi * area * float(radiance.mean())
     if facing < _FACES_ONE_WAY * area:

@@ -55,6 +55,8 @@ class MaterialReader:
         self._warnings = warnings
         self._images = ImageDecoder(MTL_FORMATS)
         self._decoded: dict[tuple[str, bool], UInt8[np.ndarray, "height width 3"]] = {}
+        self._textured_with: dict[tuple[int, Wrap], int] = {}
+        self._default = Plugin("bsdf", "diffuse", "a shape without a material")
         self._made: dict[int, Surfacing | None] = {}
         self._kept: list[Plugin] = []
 
@@ -68,7 +70,7 @@ class MaterialReader:
             SceneFileError: the material or texture type is unsupported, or a texture cannot be read.
         """
         if bsdf is None:
-            bsdf = Plugin("bsdf", "diffuse", "a shape without a material")
+            bsdf = self._default
         if id(bsdf) not in self._made:
             self._kept.append(bsdf)  # keep the object alive, so that its id stays unique
             self._made[id(bsdf)] = self._diffuse_part(bsdf)
@@ -122,7 +124,7 @@ class MaterialReader:
             return None
         material = self.materials[inner.material]
         texture = None if material.texture is None else self.textures[material.texture]
-        number, to_uv = 1.0, inner.to_uv
+        number, to_uv, index = 1.0, inner.to_uv, material.texture
         opacity = mask.child("opacity")
         if opacity is None or opacity.kind != "texture":
             number = min(max(float(mask.vector("opacity", (0.5, 0.5, 0.5)).mean()), 0.0), 1.0)
@@ -136,8 +138,8 @@ class MaterialReader:
             linear = linear_from_srgb(self._texels(opacity)[..., 0] / 255.0)
             plane, to_uv = np.round(255.0 * linear).astype(np.uint8), _to_uv(opacity)
             texture = _with_opacity(texture, plane, self._images, mask.where)
+            index = len(self.textures)
             self.textures.append(texture)
-        index = None if texture is None else material.texture if number < 1.0 else len(self.textures) - 1
         masked = replace(material, texture=index, alpha_mode="blend", opacity=number)
         masked = without_idle_alpha(masked, texture)
         say_blended(masked, self._warnings)
@@ -188,10 +190,12 @@ class MaterialReader:
                 f"{texture.where}: wrap_mode must be one of {', '.join(_WRAPS)}, got {wrap!r:.40}"
             )
         texels = self._texels(texture)
-        self.textures.append(
-            Texture(label(texture.text("filename"), "texture"), texels, _WRAPS[wrap], _WRAPS[wrap])
-        )
-        return self._add(name, factor, len(self.textures) - 1, to_uv)
+        key = (id(texels), _WRAPS[wrap])
+        if key not in self._textured_with:
+            self._textured_with[key] = len(self.textures)
+            of_file = label(texture.text("filename"), "texture")
+            self.textures.append(Texture(of_file, texels, _WRAPS[wrap], _WRAPS[wrap]))
+        return self._add(name, factor, self._textured_with[key], to_uv)
 
     def _texels(self, texture: Plugin) -> UInt8[np.ndarray, "height width 3"]:
         name, is_raw = texture.text("filename"), texture.flag("raw", False)

@@ -2,6 +2,7 @@
 
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,12 +10,14 @@ from PIL import Image
 from reading_cost import MITSUBA, check_cost
 
 from vpltune.renderer.errors import InputError
-from vpltune.renderer.scene.files.limits import MAX_INSTANCES
+from vpltune.renderer.scene.files.limits import MAX_INSTANCES, MAX_PLACED_VERTICES
 from vpltune.renderer.scene.mitsuba_import import read_mitsuba
+from vpltune.renderer.scene.scene import Instance, Mesh, Scene, transform_points
 
 CUBE = '<shape type="cube"/>'
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 LINE = "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"
+FLAT = '<boolean name="face_normals" value="true"/>'
 OBJ = '<shape type="obj"><string name="filename" value="{}"/></shape>'
 
 
@@ -58,6 +61,84 @@ def test_a_small_file_costs_little(tmp_path, text, message):
     path = tmp_path / "scene.xml"
     path.write_text(text)
     assert message in check_cost(path, MITSUBA)
+
+
+SHARED = {
+    "spheres": '<shape type="sphere"/>',
+    "flat spheres": '<shape type="sphere"><boolean name="face_normals" value="true"/></shape>',
+    "emitters": '<shape type="sphere"><emitter type="area"/></shape>',
+    "disks": '<shape type="disk"><emitter type="area"/></shape>',
+    "a file": OBJ.format("grid.obj"),
+    "a large map": '<shape type="cube"><bsdf type="diffuse"><texture type="bitmap" name="reflectance">'
+    '<string name="filename" value="map.png"/></texture></bsdf></shape>',
+}
+
+
+@pytest.mark.parametrize("shape", SHARED.values(), ids=SHARED)
+def test_shapes_that_have_their_triangles_in_common_share_the_work(tmp_path, shape):
+    """5,000 spheres would take 8 s with triangles of their own, and so many readings of a file a minute."""
+    (tmp_path / "grid.obj").write_text(grid_obj(60))
+    Image.new("RGB", (2048, 2048)).save(tmp_path / "map.png")
+    path = tmp_path / "scene.xml"
+    path.write_text(f"<scene>{shape * 5_000}{CUBE}</scene>")
+    assert check_cost(path, MITSUBA) == ""
+
+
+def grid_obj(side):
+    """Squares, side × side of them."""
+    lines = [f"v {x} {y} 0" for y in range(side + 1) for x in range(side + 1)]
+    first = [y * (side + 1) + x + 1 for y in range(side) for x in range(side)]
+    lines += [f"f {i} {i + 1} {i + side + 2} {i + side + 1}" for i in first]
+    return "\n".join(lines)
+
+
+def test_instances_that_place_many_vertices_are_refused_by_their_count(tmp_path):
+    """Each has a vertex for every corner of a triangle, since the grid is shaded flat."""
+    (tmp_path / "grid.obj").write_text(grid_obj(60))
+    body = f'<shape type="shapegroup" id="g">{OBJ.format("grid.obj").replace("</shape>", FLAT + "</shape>")}'
+    body += "</shape>" + '<shape type="instance"><ref id="g"/></shape>' * 9_000
+    path = tmp_path / "scene.xml"
+    path.write_text(f"<scene>{body}</scene>")
+    # 60² squares of two triangles, three corners each.
+    placed = 9_000 * 60**2 * 6
+    said = f"its instances must place at most {MAX_PLACED_VERTICES:,} vertices together, got {placed:,}"
+    assert said in check_cost(path, MITSUBA)
+
+
+def test_shapes_share_a_mesh_where_material_and_triangles_are_the_same(tmp_path):
+    red = '<bsdf type="diffuse" id="red"><rgb name="reflectance" value="1 0 0"/></bsdf>'
+    use = '<shape type="sphere"><float name="radius" value="{}"/>{}</shape>'
+    body = red + use.format(1, "") + use.format(2, "") + use.format(3, '<ref id="red"/>') + CUBE
+    scene = read(tmp_path, body)
+    assert [instance.mesh for instance in scene.instances] == [0, 0, 1, 2]
+    assert [mesh.material for mesh in scene.meshes] == [0, 1, 0]
+    assert scene.meshes[1].positions is scene.meshes[0].positions
+    assert scene.bounds()[1] == pytest.approx([3.0] * 3, rel=1e-6)  # the sphere's poles and equator
+
+
+def test_bounds_are_those_of_all_placed_vertices():
+    """More vertices and instances than are bounded at a time."""
+    rng = np.random.default_rng(3)
+    points = rng.normal(size=(40_000, 3)).astype(np.float32)
+    mesh = Mesh(
+        "cloud",
+        points,
+        np.zeros_like(points),
+        np.zeros((len(points), 2), np.float32),
+        np.ones_like(points),
+        np.array([[0, 1, 2]], np.int32),
+        0,
+    )
+    few = replace(mesh, positions=points[:3], normals=points[:3], uv=mesh.uv[:3], colors=points[:3])
+    matrices = np.tile(np.eye(4), (20_003, 1, 1))
+    matrices[:, :3] = rng.normal(size=(20_003, 3, 4))
+    instances = [Instance("", int(i >= 3), matrix) for i, matrix in enumerate(matrices)]
+    scene = Scene("clouds", (mesh, few), tuple(instances), ())
+    placed = np.concatenate(
+        [transform_points(matrix, points if i < 3 else points[:3]) for i, matrix in enumerate(matrices)]
+    )
+    # Sums of three products in another order: 1e-14 of lengths of 10.
+    np.testing.assert_allclose(scene.bounds(), [placed.min(axis=0), placed.max(axis=0)], atol=1e-13)
 
 
 def test_a_default_is_put_in_once_and_whole(tmp_path):

@@ -117,7 +117,7 @@ def test_motion_follows_the_scale(gl_context, factor):
 
 
 def in_units(scene, size):
-    """The scene as a file has it whose vertices are `size` times as far out; its nodes turn and do no more."""
+    """The scene as a file has it whose vertices are `size` times as far out; its nodes only turn."""
     meshes = [
         replace(
             mesh,

@@ -90,7 +90,8 @@ SMALLEST_EXTENT = 1e-12
 """Smallest diagonal of a scene in world units. A choice, like the largest coordinate."""
 
 LARGEST_RADIOMETRIC = 1e18
-"""A choice: largest intensity of a light, W/sr or W/m². Times any albedo and area it is finite in float32."""
+"""A choice: largest intensity of a light as it is drawn (`working_scale`), W/sr or W/m². Times any albedo and
+area it is finite in float32."""
 
 
 class DecodedBytes:

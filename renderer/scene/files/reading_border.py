@@ -9,6 +9,7 @@ from vpltune.renderer.errors import InputError, MachineError
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, one_line
 from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, MAX_PLACED_VERTICES, SMALLEST_EXTENT
 from vpltune.renderer.scene.scene import Scene
+from vpltune.renderer.scene.working_scale import too_strong
 
 
 def read_at_border(path: Path | str, read: Callable[[], Scene]) -> Scene:
@@ -70,3 +71,6 @@ def _check(scene: Scene) -> None:
     extent = float(np.linalg.norm(high - low))
     if not extent >= SMALLEST_EXTENT:
         raise SceneFileError(f"the scene must be at least {SMALLEST_EXTENT:g} across, got {extent:g}")
+    fault = too_strong(scene.lights, extent)
+    if fault is not None:
+        raise SceneFileError(fault)

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
-from vpltune.renderer.scene.files.limits import LARGEST_RADIOMETRIC, LARGEST_UV, MAX_INSTANCES, DecodedBytes
+from vpltune.renderer.scene.files.limits import LARGEST_UV, MAX_INSTANCES, DecodedBytes
 from vpltune.renderer.scene.files.plain_numbers import plain_number
 from vpltune.renderer.scene.files.reading_border import read_at_border, require_few_placed
 from vpltune.renderer.scene.files.surface import require_within
@@ -91,7 +91,6 @@ class _Import:
             found = punctual_light(emitter, self.folder, extent, self.warnings)
             if found is not None:
                 self.lights.append(found)
-        self._check_lights()
         self._warn_unread(root)
         cameras = tuple(camera for sensor in root.of_kind("sensor") if (camera := self._camera(sensor)))
         if not self.lights:
@@ -118,15 +117,6 @@ class _Import:
         if surfacing is None or hidden:
             return None
         return self._surfaced(plugin, shape.mesh, surfacing), to_world
-
-    def _check_lights(self) -> None:
-        for light, _ in self.lights:
-            strongest_channel = float(light.intensity.max())
-            if not strongest_channel <= LARGEST_RADIOMETRIC:
-                raise SceneFileError(
-                    f"{light.name}: its intensity must be at most {LARGEST_RADIOMETRIC:g}, "
-                    f"got {strongest_channel:g}"
-                )
 
     def _surfaced(self, plugin: Plugin, mesh: Mesh, surfacing: Surfacing) -> int:
         """Index of the mesh with a material. Shapes that have both in common share it."""

@@ -276,15 +276,14 @@ def test_why_no_triangle_is_left_is_said(tmp_path):
 @pytest.mark.parametrize(
     "emitter",
     [
-        '<emitter type="point"><rgb name="intensity" value="1e19"/></emitter>',
-        '<shape type="rectangle"><transform name="to_world"><scale value="1e6"/></transform>'
-        '<emitter type="area"><rgb name="radiance" value="1e8"/></emitter></shape>',
+        '<emitter type="point"><rgb name="intensity" value="6e19"/></emitter>',
+        '<shape type="rectangle"><emitter type="area"><rgb name="radiance" value="1e19"/></emitter></shape>',
     ],
     ids=["point", "area"],
 )
 def test_a_light_that_no_scene_file_may_hold_is_refused(tmp_path, emitter):
     """A .glb of it could not be read again."""
-    with pytest.raises(InputError, match=r"its intensity must be at most 1e\+18, got [16]e\+(19|20)"):
+    with pytest.raises(InputError, match=r"intensity must be at most 1e\+18 W/sr .*, got 6e\+19"):
         read(tmp_path, CUBE + emitter)
 
 

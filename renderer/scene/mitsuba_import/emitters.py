@@ -7,17 +7,16 @@ normal. An emitter that faces all directions, such as a sphere, becomes a point 
 """
 
 import math
-import tempfile
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-import OpenEXR
 from jaxtyping import Float64
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
+from vpltune.renderer.scene.mitsuba_import.environment_map import environment_light
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
+from vpltune.renderer.scene.mitsuba_import.values import unit_direction
 from vpltune.renderer.scene.scene import Light, Mesh, cofactor_matrix
 from vpltune.renderer.scene.spot_cone import checked_cone
 
@@ -26,10 +25,6 @@ from vpltune.renderer.scene.spot_cone import checked_cone
 _FACES_ONE_WAY = 0.9
 # A choice: distance of a spot from its emitting surface in units of √area, enough to clear rounding.
 _LIFT = 1e-3
-# A choice: half angle of the part of an environment that becomes one directional light, radians.
-_SUN_CONE = math.radians(30.0)
-# A choice: rows of the coarse map in which the brightest part of an environment is searched; 7.5° each.
-_COARSE_ROWS = 24
 # A choice: most lights kept.
 MOST_LIGHTS = 8
 # A choice: the weakest lights are left out if together they carry at most this share of the total flux.
@@ -131,7 +126,7 @@ def punctual_light(
             light = _directional(emitter)
             flux = across * float(light.intensity.mean())
         case "envmap":
-            return _environment(emitter, folder, across, warnings)
+            return environment_light(emitter, folder, across, warnings)
         case "constant":
             warnings.add(
                 "the constant environment is ignored: it lights from all directions, which no punctual light "
@@ -201,7 +196,13 @@ def _spot(emitter: Plugin, warnings: Warnings) -> tuple[Light, float]:
     to_world = emitter.to_world()
     intensity = emitter.vector("intensity", (1.0, 1.0, 1.0))
     light = Light(
-        "spot", intensity, to_world[:3, 3], _unit(to_world[:3, 2], emitter), inner, outer, name="spot"
+        "spot",
+        intensity,
+        to_world[:3, 3],
+        unit_direction(to_world[:3, 2], emitter.where),
+        inner,
+        outer,
+        name="spot",
     )
     return light, 2.0 * math.pi * (1.0 - math.cos((inner + outer) / 2.0)) * float(intensity.mean())
 
@@ -211,104 +212,9 @@ def _directional(emitter: Plugin) -> Light:
     if "direction" in emitter.values:
         direction = emitter.vector("direction", (0.0, 0.0, 1.0))
     irradiance = emitter.vector("irradiance", (1.0, 1.0, 1.0))
-    return Light("directional", irradiance, direction_world=_unit(direction, emitter), name="directional")
-
-
-def _environment(
-    emitter: Plugin, folder: SceneFolder, across: float, warnings: Warnings
-) -> tuple[Light, float] | None:
-    """A directional light with the light vector of the brightest part of the environment.
-
-    The light vector (Gershun 1939) is the net irradiance through a surface perpendicular to it. That of the
-    whole environment would point between a low sun and the zenith, where rooms have ceilings.
-    """
-    name = emitter.text("filename")
-    try:
-        content = folder.read(name, emitter.where)
-    except SceneFileError as error:
-        warnings.add(f"the environment {name!r:.80} is ignored: {error}")
-        return None
-    if not name.lower().endswith(".exr"):
-        warnings.add(f"the environment {name!r:.80} is ignored: only .exr images are supported")
-        return None
-    pixels = _exr_pixels(content, f"{emitter.where}: {name!r:.80}") * emitter.number("scale", 1.0)
-    directions, flux = _coarse_sky(pixels)
-    inside = directions @ directions.T > math.cos(_SUN_CONE)
-    # [cone, axis, channel]
-    vectors = np.einsum("cd,da,dr->car", inside.astype(np.float64), directions, flux)
-    strength = np.linalg.norm(vectors.mean(axis=2), axis=1)
-    total = float(flux.sum(axis=0).mean())
-    brightest = int(strength.argmax())
-    share = float(strength[brightest]) / total if total > 0.0 else 0.0
-    # No main direction: the brightest cone has less than 1.5 times its share of a uniform environment.
-    if share < 1.5 * (1.0 - math.cos(_SUN_CONE)) / 2.0:
-        warnings.add(
-            f"the environment {name!r:.80} is ignored: it lights from all directions, which no punctual "
-            "light can represent"
-        )
-        return None
-    towards = vectors[brightest].mean(axis=1)
-    unit = towards / np.linalg.norm(towards)
-    irradiance = np.maximum(unit @ vectors[brightest], 0.0)
-    direction = _unit(-(emitter.to_world()[:3, :3] @ unit), emitter)
-    warnings.add(
-        f"the environment {name!r:.80} becomes one directional light, which represents its brightest "
-        f"{math.degrees(2 * _SUN_CONE):.0f}° and {share:.0%} of its light"
+    return Light(
+        "directional",
+        irradiance,
+        direction_world=unit_direction(direction, emitter.where),
+        name="directional",
     )
-    light = Light("directional", irradiance, direction_world=direction, name="environment")
-    return light, across * float(irradiance.mean())
-
-
-def _coarse_sky(
-    pixels: Float64[np.ndarray, "rows columns 3"],
-) -> tuple[Float64[np.ndarray, "cells 3"], Float64[np.ndarray, "cells 3"]]:
-    """Unit directions of the cells of a coarse map, and the integral of radiance over each cell."""
-    rows, columns, _ = pixels.shape
-    azimuth = 2.0 * np.pi * (np.arange(columns) + 0.5) / columns
-    polar = np.pi * (np.arange(rows) + 0.5) / rows
-    weighted = pixels * (2.0 * np.pi / columns * np.pi / rows * np.sin(polar)[:, None, None])
-    # Mitsuba measures azimuth from −Z towards +X, and the polar angle from +Y.
-    sine, cosine = np.sin(polar)[:, None], np.cos(polar)[:, None]
-    directions = np.stack(
-        np.broadcast_arrays(sine * np.sin(azimuth), cosine, -sine * np.cos(azimuth)), axis=-1
-    )
-    row = np.arange(rows) * min(rows, _COARSE_ROWS) // rows
-    column = np.arange(columns) * min(columns, 2 * _COARSE_ROWS) // columns
-    cell = (row[:, None] * 2 * _COARSE_ROWS + column).ravel()
-    count = 2 * _COARSE_ROWS**2
-
-    def summed(values: np.ndarray) -> Float64[np.ndarray, "cells 3"]:
-        return np.stack([np.bincount(cell, values[..., i].ravel(), count) for i in range(3)], axis=-1)
-
-    middle = summed(directions)
-    length = np.linalg.norm(middle, axis=1)
-    used = length > 0.0
-    return middle[used] / length[used, None], summed(weighted)[used]
-
-
-def _exr_pixels(content: bytes, where: str) -> Float64[np.ndarray, "height width 3"]:
-    # OpenEXR can only read from a file.
-    with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder) / "environment.exr"
-        copy.write_bytes(content)
-        try:
-            channels = OpenEXR.File(str(copy)).channels()
-        except Exception as error:  # OpenEXR raises many types, none of its own
-            raise SceneFileError(f"{where}: is not an OpenEXR image ({error})") from error
-        if "RGB" in channels or "RGBA" in channels:
-            pixels = (channels.get("RGB") or channels["RGBA"]).pixels[..., :3]
-        elif all(name in channels for name in "RGB"):
-            pixels = np.stack([channels[name].pixels for name in "RGB"], axis=-1)
-        else:
-            raise SceneFileError(f"{where}: must have channels R, G and B, got {', '.join(sorted(channels))}")
-        pixels = pixels.astype(np.float64)
-    if not (np.isfinite(pixels).all() and (pixels >= 0.0).all()):
-        raise SceneFileError(f"{where}: radiance must be finite and ≥ 0")
-    return pixels
-
-
-def _unit(vector: Float64[np.ndarray, "3"], emitter: Plugin) -> Float64[np.ndarray, "3"]:
-    length = float(np.linalg.norm(vector))
-    if not length > 0.0:
-        raise SceneFileError(f"{emitter.where}: its direction must not be zero")
-    return vector / length

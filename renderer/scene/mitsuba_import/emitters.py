@@ -15,6 +15,7 @@ from jaxtyping import Float64
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
 from vpltune.renderer.scene.mitsuba_import.environment_map import environment_light
+from vpltune.renderer.scene.mitsuba_import.materials import MaterialReader, texture_name
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
 from vpltune.renderer.scene.mitsuba_import.values import unit_direction
 from vpltune.renderer.scene.scene import Light, Mesh, cofactor_matrix
@@ -62,20 +63,19 @@ def mesh_facets(mesh: Mesh) -> Facets:
 
 
 def area_emitter(
-    emitter: Plugin, facets: Facets, to_world: Float64[np.ndarray, "4 4"], outwards: float
+    radiance: Float64[np.ndarray, "3"],
+    facets: Facets,
+    to_world: Float64[np.ndarray, "4 4"],
+    outwards: float,
 ) -> AreaEmitter | None:
     """The punctual light that replaces an area emitter; None if the emitter is black or has no area.
 
     Args:
-        emitter: the plugin, whose `radiance` is in W/(m²·sr).
+        radiance: in W/(m²·sr).
         facets: of the shape.
         to_world: places them.
         outwards: 1 if light leaves the side on which the triangles wind counter-clockwise, −1 for the other.
-
-    Raises:
-        SceneFileError: the radiance is textured or not a colour.
     """
-    radiance = _radiance(emitter)
     to_vector = cofactor_matrix(to_world)
     vectors = to_vector @ facets.vectors
     areas = np.sqrt(np.einsum("at,at->t", vectors, vectors))
@@ -164,10 +164,29 @@ def strongest(lights: list[tuple[Light, float]], warnings: Warnings) -> tuple[Li
     return tuple(lights[index][0] for index in sorted(kept))
 
 
-def _radiance(emitter: Plugin) -> Float64[np.ndarray, "3"]:
-    if emitter.child("radiance") is not None:
-        raise SceneFileError(f"{emitter.where}: a textured radiance is not supported")
-    return emitter.vector("radiance", (1.0, 1.0, 1.0))
+def area_radiance(emitter: Plugin, materials: MaterialReader, warnings: Warnings) -> Float64[np.ndarray, "3"]:
+    """The radiance of an area emitter in W/(m²·sr); of a textured one, the mean of its texture.
+
+    Args:
+        emitter: the plugin.
+        materials: reads textures.
+        warnings: takes a line for a texture.
+
+    Raises:
+        SceneFileError: the radiance is not a colour, or its texture cannot be read.
+    """
+    texture = emitter.child("radiance")
+    if texture is None:
+        return emitter.vector("radiance", (1.0, 1.0, 1.0))
+    if texture.kind != "texture":
+        raise SceneFileError(f"{emitter.where}: 'radiance' must be a colour or a texture")
+    mean = materials.mean_color(texture)
+    shown = ", ".join(f"{channel:.3g}" for channel in mean)
+    warnings.add(
+        f"the radiance of an area emitter is the texture {texture_name(texture)}: its mean, {shown} "
+        "W/(m²·sr), is used all over"
+    )
+    return mean
 
 
 def _position(emitter: Plugin) -> Float64[np.ndarray, "3"]:

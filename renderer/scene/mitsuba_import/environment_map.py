@@ -53,7 +53,7 @@ def environment_light(
     if not name.lower().endswith(".exr"):
         warnings.add(f"the environment {name!r:.80} is ignored: only .exr images are supported")
         return None
-    directions, flux = _coarse_sky(_exr_pixels(content, f"{emitter.where}: {name!r:.80}"))
+    directions, flux = _coarse_sky(exr_channels(content, f"{emitter.where}: {name!r:.80}"))
     flux *= emitter.number("scale", 1.0)
     inside = directions @ directions.T > math.cos(_SUN_CONE)
     # [cone, axis, channel]
@@ -111,8 +111,17 @@ def _cell_starts(count: int, cells: int) -> np.ndarray:
     return -(-np.arange(cells) * count // cells)
 
 
-def _exr_pixels(content: bytes, where: str) -> list[np.ndarray]:
-    """Red, green and blue, each [height, width], in the type that the file has them in."""
+def exr_channels(content: bytes, where: str) -> list[np.ndarray]:
+    """Red, green and blue of an OpenEXR image, each [height, width], in the type that the file has them in.
+
+    Args:
+        content: the file.
+        where: the place in the scene's file, for messages.
+
+    Raises:
+        SceneFileError: the image is too large, is broken or lacks a channel, or a value is negative or not
+            finite.
+    """
     # OpenEXR 3.3 can only read from a file.
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "environment.exr"

@@ -15,6 +15,7 @@ from vpltune.renderer.scene.files.surface import require_within
 from vpltune.renderer.scene.mitsuba_import.emitters import (
     Facets,
     area_emitter,
+    area_radiance,
     mesh_facets,
     punctual_light,
     strongest,
@@ -142,7 +143,8 @@ class _Import:
             outwards = -outwards
         if id(mesh) not in self.facets:
             self.facets[id(mesh)] = mesh_facets(mesh)
-        found = area_emitter(emitters[0], self.facets[id(mesh)], to_world, outwards)
+        radiance = area_radiance(emitters[0], self.materials, self.warnings)
+        found = area_emitter(radiance, self.facets[id(mesh)], to_world, outwards)
         if found is None:
             return False
         kind = found.light.kind

@@ -5,6 +5,7 @@ import time
 from dataclasses import replace
 
 import numpy as np
+import OpenEXR
 import pytest
 from PIL import Image
 from reading_cost import MITSUBA, check_cost
@@ -17,6 +18,7 @@ from vpltune.renderer.scene.scene import Instance, Mesh, Scene, transform_points
 CUBE = '<shape type="cube"/>'
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 LINE = "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"
+RAW = '<boolean name="raw" value="true"/>'
 FLAT = '<boolean name="face_normals" value="true"/>'
 OBJ = '<shape type="obj"><string name="filename" value="{}"/></shape>'
 
@@ -192,6 +194,48 @@ def test_meshes_without_area_are_left_out_together(tmp_path):
     scene = read(tmp_path, CUBE + OBJ.format("line.obj") * 20)
     assert len(scene.instances) == 1
     assert "20 shapes have no triangle with area; they are left out" in scene.warnings
+
+
+GLOWING = '<shape type="rectangle"><emitter type="area">{}</emitter></shape>'
+GLOWING = GLOWING.format('<texture type="{}" name="radiance">{}</texture>')
+
+
+@pytest.mark.parametrize(
+    ("kind", "inner", "mean"),
+    [
+        # sRGB's 188 is 0.503 of 255 in linear light (IEC 61966-2-1): the halves' mean, not the mean's half.
+        ("bitmap", '<string name="filename" value="map.png"/>', (0.5 * 0.50289, 0.0, 0.5)),
+        ("bitmap", '<string name="filename" value="map.png"/>' + RAW, (0.5 * 188 / 255, 0.0, 0.5)),
+        ("bitmap", '<string name="filename" value="map.exr"/>', (6.0, 3.0, 0.0)),
+        (
+            "checkerboard",
+            '<rgb name="color0" value="8 0 2"/><rgb name="color1" value="2 4 0"/>',
+            (5.0, 2.0, 1.0),
+        ),
+    ],
+    ids=["sRGB", "linear", "EXR", "checkerboard"],
+)
+def test_a_textured_radiance_becomes_its_mean_with_a_word(tmp_path, kind, inner, mean):
+    texels = np.zeros((200, 4, 3), np.uint8)
+    texels[:100, :, 0], texels[100:, :, 2] = 188, 255
+    Image.fromarray(texels).save(tmp_path / "map.png")
+    pixels = np.zeros((2, 2, 3), np.float32)
+    pixels[0] = (12.0, 6.0, 0.0)
+    OpenEXR.File({}, {"RGB": pixels}).write(str(tmp_path / "map.exr"))
+    scene = read(tmp_path, GLOWING.format(kind, inner))
+    (light,) = scene.lights
+    # A spot of a square of 4 m² has 3/2 · A · L. Raw texels are kept in 8 bits, as sRGB: half a step of 255.
+    np.testing.assert_allclose(light.intensity, 6.0 * np.array(mean), rtol=5e-3)
+    (said,) = [line for line in scene.warnings if "radiance" in line]
+    assert f"its mean, {light.intensity[0] / 6.0:.3g}, " in said and (
+        "map." in said or "checkerboard" in said
+    )
+
+
+def test_a_scaled_radiance_is_scaled(tmp_path):
+    inner = '<texture type="checkerboard"/><float name="scale" value="10"/>'
+    (light,) = read(tmp_path, GLOWING.format("scale", inner)).lights
+    np.testing.assert_allclose(light.intensity, 6.0 * 3.0, rtol=1e-12)  # the mean of 0.4 and 0.2
 
 
 def test_an_absent_environment_is_said(tmp_path):

@@ -52,7 +52,8 @@ class AnimationPlayer:
         """The pose `seconds` after the start.
 
         Raises:
-            InputError: a world matrix exceeds the range of coordinates, `LARGEST_COORDINATE`.
+            InputError: a world matrix exceeds the range of coordinates, `LARGEST_COORDINATE` times the scale
+                of `Animation.root_to_world`.
         """
         return self._pose(seconds)
 
@@ -92,10 +93,12 @@ class AnimationPlayer:
         for level, rows in enumerate(self._levels):
             above = world[animation.parents[rows]] if level else animation.root_to_world
             world[rows] = above @ local[rows]
-        if not np.abs(world).max(initial=0.0) <= LARGEST_COORDINATE:
+        # Above the nodes stands the scale at which the scene is drawn. The limit is one of the file's units.
+        scale = abs(float(np.linalg.det(animation.root_to_world[:3, :3]))) ** (1 / 3)
+        if not np.abs(world).max(initial=0.0) <= LARGEST_COORDINATE * scale:
             raise InputError(
                 f"{self._scene.name}: its animation must stay within {LARGEST_COORDINATE:g}, "
-                f"which it leaves at {seconds} s"
+                f"which it leaves {'at rest' if seconds is None else f'at {seconds} s'}"
             )
         return world
 

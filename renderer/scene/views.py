@@ -213,7 +213,9 @@ def light_from_json(entry: Any, where: str) -> Light:
     kind = _member(entry, "type", where)
     if kind not in ("spot", "point", "directional"):
         raise InputError(f"{where}.type: must be 'spot', 'point' or 'directional', got {kind!r:.60}")
-    intensity = _numbers(entry, "intensity", 3, where, LARGEST_RADIOMETRIC)
+    # What a point or spot light may have depends on the scene's size, and is checked with it.
+    most = LARGEST_RADIOMETRIC if kind == "directional" else LARGEST_NUMBER
+    intensity = _numbers(entry, "intensity", 3, where, most)
     if (intensity < 0.0).any():
         raise InputError(f"{where}.intensity: must not be negative, got {intensity.tolist()}")
     light: dict[str, Any] = {}

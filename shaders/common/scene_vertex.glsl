@@ -56,6 +56,14 @@ mat3 normal_matrix(mat3 linear) {
     return mat3(cross(linear[1], linear[2]), cross(linear[2], linear[0]), cross(linear[0], linear[1]));
 }
 
+// The matrix times a power of two: its cofactors and their squares stay within float32, at any scale of the scene.
+mat3 near_one(mat3 linear) {
+    vec3 largest = max(max(abs(linear[0]), abs(linear[1])), abs(linear[2]));
+    int exponent;
+    frexp(max(max(largest.x, largest.y), largest.z), exponent);
+    return linear * ldexp(1.0, -exponent);
+}
+
 // The vertex that this invocation draws.
 SceneVertex scene_vertex() {
     SceneInstance instance = scene_instances[in_instance];
@@ -63,7 +71,7 @@ SceneVertex scene_vertex() {
     mat3 normal_to_world = mat3(instance.normal_to_world);
     if (instance.skinning.z > 0) {
         to_world = blended_joints(instance.skinning);
-        normal_to_world = normal_matrix(mat3(to_world));
+        normal_to_world = normal_matrix(near_one(mat3(to_world)));
     }
     SceneVertex vertex;
     vertex.position_world = (to_world * vec4(in_position, 1.0)).xyz;

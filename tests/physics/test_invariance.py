@@ -1,8 +1,11 @@
 """What must not change the image: more VPLs, finer maps, more pixels, and the scene's scale."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
+from moving_scenes import bent_board
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
@@ -11,6 +14,7 @@ from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.animation import Pose
 from vpltune.renderer.scene.dynamic_lights import DynamicLights, point_lights, scaled_records
 from vpltune.renderer.scene.scene import Camera, look_at, scaled
+from vpltune.renderer.scene.sequence import Sequence
 from vpltune.renderer.scene.views import View, scaled_view
 
 ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.15, 0.45))
@@ -92,6 +96,38 @@ def test_dynamic_lights_and_poses_follow_the_scale(gl_context, factor):
         )
     error = np.sqrt(np.mean((images[1] - images[0]) ** 2) / np.mean(images[0] ** 2))
     assert error < 2e-3
+
+
+@pytest.mark.parametrize("factor", [1e-12, 1e11])
+def test_motion_follows_the_scale(gl_context, factor):
+    """A file with coordinates so small or large moves as that of thousandths does, to 2e-3 as above."""
+    images = []
+    for size in (1e-3, factor):
+        scene = in_units(bent_board(), size)
+        runtime = Runtime(scene, context=gl_context)
+        view = scaled_view(room_view("spot"), size)
+        frames = []
+        for seconds in (0.0, 1.0):
+            runtime.pose(Sequence(scene, view, "none").at(seconds).pose)
+            frames.append(runtime.render_radiance(view, TunedConfig(PARAMETERS)))
+        images.append(np.stack(frames))
+    assert np.abs(images[0][1] - images[0][0]).mean() > 0.01 * images[0].mean()  # the board turns
+    error = np.sqrt(np.mean((images[1] - images[0]) ** 2) / np.mean(images[0] ** 2))
+    assert error < 2e-3
+
+
+def in_units(scene, size):
+    """The scene as a file has it whose vertices are `size` times as far out; its nodes only turn."""
+    meshes = [
+        replace(
+            mesh,
+            positions=mesh.positions * np.float32(size),
+            skinning=mesh.skinning
+            and replace(mesh.skinning, bind_positions=mesh.skinning.bind_positions * np.float32(size)),
+        )
+        for mesh in scene.meshes
+    ]
+    return replace(scene, meshes=tuple(meshes))
 
 
 def test_no_absolute_length_in_a_shader():

@@ -19,6 +19,7 @@ EXTRA_MODULES: Mapping[str, tuple[str, ...]] = {
         "psutil",
         "scipy",
     ),
+    "ktx": ("opengl_basisu",),
     "cluster": ("distributed", "submitit"),
     "tensorboard": ("tensorboardX",),
 }

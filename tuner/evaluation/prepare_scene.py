@@ -17,6 +17,7 @@ from vpltune.renderer.scene.placement import named_cameras, resolve_camera_and_l
 from vpltune.renderer.scene.placement.scene_sidecar import completed_camera_and_lights
 from vpltune.renderer.scene.scene import Camera, Light, Scene
 from vpltune.renderer.scene.views import SPLITS, View
+from vpltune.renderer.scene.working_scale import require_drawable
 from vpltune.tuner.reference import ReferenceView, reference_views
 from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
 from vpltune.tuner.surrogate.compiled_functions import keep_compiled_functions
@@ -188,6 +189,8 @@ def _views(
     own = options.fixed_views
     if own is not None and all(view.split != "fitted" for view in own):
         raise InputError("views: at least one must have the split 'fitted'")
+    for view in own or ():
+        require_drawable(view.lights, scene, f"view {view.name!r:.60}")
     if own is not None and not validated:
         return tuple(view for view in own if view.split in ("fitted", "held_out")), ()
     if own is not None:

@@ -12,6 +12,7 @@ from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.placement import named_camera, resolve_camera_and_lights
 from vpltune.renderer.scene.scene import Camera, Light
 from vpltune.renderer.scene.views import View, read_views
+from vpltune.renderer.scene.working_scale import require_drawable
 
 if TYPE_CHECKING:
     from vpltune.renderer.scene.scene import Scene
@@ -42,9 +43,10 @@ class ChosenView:
         automatically.
 
         Raises:
-            InputError: the sidecar cannot be used.
+            InputError: the sidecar cannot be used, or a light is too strong for the scene.
         """
         if self.from_file is not None:
+            require_drawable(self.from_file.lights, scene, f"view {self.from_file.name!r:.60}")
             return replace(self.from_file, size=self.size)
         given = None if self.light is None else (self.light,)
         own = self.camera if self.camera_name is None else named_camera(scene, self.camera_name)

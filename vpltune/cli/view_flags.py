@@ -8,7 +8,6 @@ from jaxtyping import Float64
 from vpltune.cli.options import parse_numbers
 from vpltune.cli.view_options import ViewFlags
 from vpltune.renderer.errors import InputError
-from vpltune.renderer.scene.files.limits import LARGEST_RADIOMETRIC
 from vpltune.renderer.scene.scene import Camera, Light, look_at
 from vpltune.renderer.scene.spot_cone import checked_cone
 
@@ -81,8 +80,6 @@ def _intensity(text: str | None) -> Float64[np.ndarray, "3"]:
     numbers = [1.0] if text is None else parse_numbers(text, "--light-intensity", (1, 3))
     if min(numbers) < 0.0 or max(numbers) == 0.0:
         raise InputError(f"--light-intensity: must not be negative or all zero, got {text}")
-    if max(numbers) > LARGEST_RADIOMETRIC:
-        raise InputError(f"--light-intensity: must be at most {LARGEST_RADIOMETRIC:g}, got {text}")
     return np.array(numbers * (3 // len(numbers)), np.float64)
 
 

@@ -23,6 +23,7 @@ READ_EXTENSIONS = frozenset(
         "KHR_materials_unlit",
         "KHR_mesh_quantization",
         "KHR_node_visibility",
+        "KHR_texture_basisu",
         "KHR_texture_transform",
     }
 )
@@ -45,11 +46,6 @@ IRRELEVANT_EXTENSIONS = frozenset(
         "KHR_xmp_json_ld",
     }
 )
-
-# What to do about an extension that files often require and that is not supported.
-_REMEDIES = {
-    "KHR_texture_basisu": "convert the textures from KTX2 to PNG or JPEG and leave the extension out",
-}
 
 
 @dataclass(frozen=True)
@@ -150,10 +146,7 @@ def _check_extensions(document: GltfDocument) -> None:
     required = document.required_extensions
     for name in required:
         if name not in known:
-            remedy = _REMEDIES.get(name)
-            raise SceneFileError(
-                f"extensionsRequired: {name!r:.80} is not supported{f'; {remedy}' if remedy else ''}"
-            )
+            raise SceneFileError(f"extensionsRequired: {name!r:.80} is not supported")
     for name in document.root.strings("extensionsUsed"):
         if name not in known and name not in required:
             document.warnings.add(f"extension {name!r:.80} is ignored")

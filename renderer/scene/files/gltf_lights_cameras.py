@@ -8,7 +8,7 @@ from jaxtyping import Float64
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, label
 from vpltune.renderer.scene.files.gltf_document import GltfDocument
 from vpltune.renderer.scene.files.json_object import JsonObject
-from vpltune.renderer.scene.files.limits import LARGEST_RADIOMETRIC
+from vpltune.renderer.scene.files.limits import LARGEST_NUMBER, LARGEST_RADIOMETRIC
 from vpltune.renderer.scene.scene import Camera, Light, without_scale
 from vpltune.renderer.scene.spot_cone import checked_cone
 
@@ -71,14 +71,16 @@ def read_light(
     color = light.numbers("color", 3, default=(1.0, 1.0, 1.0))
     if (color < 0.0).any():
         raise SceneFileError(f"{light.at('color')}: must not be negative, got {color.tolist()}")
-    strength = light.number("intensity", 1.0, low=0.0, high=LARGEST_RADIOMETRIC)
+    # What a point or spot light may have depends on the scene's size, and is checked once that is known.
+    most = LARGEST_RADIOMETRIC if kind == "directional" else LARGEST_NUMBER
+    strength = light.number("intensity", 1.0, low=0.0, high=most)
     inner, outer = _cone(light, document) if kind == "spot" else (0.0, math.pi / 4)
     if kind != "directional" and "range" in light.members:
         light.number("range")
         document.warnings.add("a light's range is ignored: light falls off as 1/d² at any distance")
     intensity = strength * color
-    if intensity.max() > LARGEST_RADIOMETRIC:
-        raise SceneFileError(f"{light.where}: color times intensity must be at most {LARGEST_RADIOMETRIC:g}")
+    if intensity.max() > most:
+        raise SceneFileError(f"{light.where}: color times intensity must be at most {most:g}")
     if not intensity.any():
         document.warnings.tally(
             "1 light has no intensity; it is left out", "{n} lights have no intensity; they are left out"

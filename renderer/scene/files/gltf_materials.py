@@ -16,6 +16,7 @@ from vpltune.renderer.scene.files.gltf_textures import (
     uv_transform,
 )
 from vpltune.renderer.scene.files.json_object import JsonObject, shown
+from vpltune.renderer.scene.files.limited_decoder import LimitedDecoder
 from vpltune.renderer.scene.files.opacity import say_blended, without_idle_alpha
 from vpltune.renderer.scene.scene import AlphaMode, Material, Texture
 
@@ -40,9 +41,9 @@ class BaseColor:
 class GltfMaterials:
     """The materials and textures that the scene's primitives use. Each is read once, when first used."""
 
-    def __init__(self, document: GltfDocument, accessors: GltfAccessors) -> None:
+    def __init__(self, document: GltfDocument, accessors: GltfAccessors, ktx2: LimitedDecoder) -> None:
         self._document = document
-        self._textures = GltfTextures(document, accessors)
+        self._textures = GltfTextures(document, accessors, ktx2)
         self.materials: list[Material] = []
         self._base_colors: dict[str, BaseColor] = {}
         self._left_out: set[str] = set()

@@ -9,10 +9,11 @@ from vpltune.renderer.scene.files.diagnostics import SceneFileError
 from vpltune.renderer.scene.files.gltf_accessors import Elements, GltfAccessors
 from vpltune.renderer.scene.files.gltf_deformation import Deformation, morphed, read_influences, skinned
 from vpltune.renderer.scene.files.gltf_document import GltfDocument
-from vpltune.renderer.scene.files.gltf_draco import DracoDecoder, decode_draco
+from vpltune.renderer.scene.files.gltf_draco import decode_draco
 from vpltune.renderer.scene.files.gltf_materials import BaseColor
 from vpltune.renderer.scene.files.gltf_textures import transformed_uv
 from vpltune.renderer.scene.files.json_object import JsonObject
+from vpltune.renderer.scene.files.limited_decoder import LimitedDecoder
 from vpltune.renderer.scene.files.limits import MAX_MORPH_BYTES, DecodedBytes
 from vpltune.renderer.scene.files.surface import Surface, finished_mesh, used_vertices
 from vpltune.renderer.scene.scene import Mesh
@@ -35,7 +36,7 @@ _ATTRIBUTE_TYPES = {
 class GltfPrimitives:
     """Reads the mesh primitives of one document."""
 
-    def __init__(self, document: GltfDocument, accessors: GltfAccessors, draco: DracoDecoder) -> None:
+    def __init__(self, document: GltfDocument, accessors: GltfAccessors, draco: LimitedDecoder) -> None:
         self._document = document
         self._accessors = accessors
         self._draco = draco

@@ -12,12 +12,12 @@ from vpltune.renderer.scene.files.gltf_accessors import GltfAccessors
 from vpltune.renderer.scene.files.gltf_animations import Placed, placed_animation, read_channels
 from vpltune.renderer.scene.files.gltf_deformation import Deformation, GltfDeformations, RestSkin
 from vpltune.renderer.scene.files.gltf_document import GltfDocument, open_gltf
-from vpltune.renderer.scene.files.gltf_draco import DracoDecoder
 from vpltune.renderer.scene.files.gltf_lights_cameras import read_camera, read_light
 from vpltune.renderer.scene.files.gltf_materials import GltfMaterials
 from vpltune.renderer.scene.files.gltf_nodes import GltfNodes
 from vpltune.renderer.scene.files.gltf_primitives import GltfPrimitives
 from vpltune.renderer.scene.files.json_object import JsonObject, JsonObjects
+from vpltune.renderer.scene.files.limited_decoder import LimitedDecoder
 from vpltune.renderer.scene.files.limits import MAX_CAMERAS, MAX_INSTANCES, MAX_LIGHTS
 from vpltune.renderer.scene.scene import Camera, Instance, Light, Mesh, Scene, trs_matrices
 
@@ -34,8 +34,8 @@ def read_gltf(path: Path, warnings: Warnings) -> Scene:
             `renderer.scene.files.limits`.
     """
     document = open_gltf(path, warnings)
-    with DracoDecoder() as draco:
-        builder = _SceneBuilder(document, draco)
+    with LimitedDecoder("draco") as draco, LimitedDecoder("ktx2") as ktx2:
+        builder = _SceneBuilder(document, draco, ktx2)
         shown = list(builder.nodes.shown())
         builder.look_for_lit_surfaces(shown)
         for index in shown:
@@ -54,11 +54,11 @@ def read_gltf(path: Path, warnings: Warnings) -> Scene:
 
 
 class _SceneBuilder:
-    def __init__(self, document: GltfDocument, draco: DracoDecoder) -> None:
+    def __init__(self, document: GltfDocument, draco: LimitedDecoder, ktx2: LimitedDecoder) -> None:
         self.document = document
         self.nodes = GltfNodes(document)
         self.accessors = GltfAccessors(document)
-        self.materials = GltfMaterials(document, self.accessors)
+        self.materials = GltfMaterials(document, self.accessors, ktx2)
         self.primitives = GltfPrimitives(document, self.accessors, draco)
         self.meshes: list[Mesh] = []
         self.instances: list[Instance] = []

@@ -13,6 +13,8 @@ from vpltune.renderer.scene.files.gltf_buffers import read_uri
 from vpltune.renderer.scene.files.gltf_document import GltfDocument
 from vpltune.renderer.scene.files.image_texels import GLTF_FORMATS, ImageDecoder
 from vpltune.renderer.scene.files.json_object import JsonObject
+from vpltune.renderer.scene.files.ktx2_images import Ktx2Decoder, is_ktx2
+from vpltune.renderer.scene.files.limited_decoder import LimitedDecoder
 from vpltune.renderer.scene.files.texel_products import dimmed, of_size
 from vpltune.renderer.scene.scene import Texture, Wrap
 
@@ -44,10 +46,11 @@ class Layers:
 class GltfTextures:
     """The textures that the scene's materials use. Each image is decoded once, when first used."""
 
-    def __init__(self, document: GltfDocument, accessors: GltfAccessors) -> None:
+    def __init__(self, document: GltfDocument, accessors: GltfAccessors, ktx2: LimitedDecoder) -> None:
         self._document = document
         self._buffers = accessors.buffers
         self._decoder = ImageDecoder(GLTF_FORMATS)
+        self._ktx2 = Ktx2Decoder(self._decoder, ktx2)
         self.textures: list[Texture] = []
         self._indices: dict[tuple[object, ...], int] = {}
         self._texels: dict[str, UInt8[np.ndarray, "height width _"]] = {}
@@ -90,18 +93,28 @@ class GltfTextures:
         webp = texture.extension("EXT_texture_webp")
         if webp is not None and "source" in webp.members:
             return self._document.referred(webp, "source", "images")
-        return self._document.referred(texture, "source", "images")
+        plain = self._document.referred(texture, "source", "images")
+        basisu = texture.extension("KHR_texture_basisu")
+        # A plain image is the same without the loss of block compression, so it goes first.
+        if plain is None and basisu is not None:
+            return self._document.referred(basisu, "source", "images")
+        return plain
 
     def texels(self, image: JsonObject) -> UInt8[np.ndarray, "height width _"]:
         """The texels of an image, as the file has them: sRGB-encoded colours, or plain numbers."""
         if image.where not in self._texels:
-            self._texels[image.where] = self._decoder.decode(*self._content(image))
+            content, where = self._content(image)
+            self._texels[image.where] = self._decoder_of(content).decode(content, where)
         return self._texels[image.where]
 
     def _opacity(self, image: JsonObject) -> UInt8[np.ndarray, "height width"] | None:
         if image.where not in self._opacities:
-            self._opacities[image.where] = self._decoder.opacity(*self._content(image))
+            content, where = self._content(image)
+            self._opacities[image.where] = self._decoder_of(content).opacity(content, where)
         return self._opacities[image.where]
+
+    def _decoder_of(self, content: bytes | memoryview) -> ImageDecoder | Ktx2Decoder:
+        return self._ktx2 if is_ktx2(content) else self._decoder
 
     def _content(self, image: JsonObject) -> tuple[bytes | memoryview, str]:
         """The bytes of an image file, and its place for messages."""

@@ -56,18 +56,14 @@ class ImageDecoder:
         return None if texels is None or texels.min() == 255 else texels[..., 0]
 
     def _read(self, content: bytes | memoryview, where: str, convert: Callable[[Image.Image], Any]) -> Any:
-        if len(content) > MAX_IMAGE_BYTES:
-            raise SceneFileError(
-                f"{where}: an image file must have at most {MAX_IMAGE_BYTES >> 20} MiB, "
-                f"got {mebibytes(len(content))}"
-            )
+        _check_length(len(content), where)
         try:
             # Opening reads the header only, so the size is checked before anything is unpacked.
             with warnings.catch_warnings():
-                # PIL warns of odd headers and large sizes; `_check_size` decides on size.
+                # PIL warns of odd headers and large sizes; `admit` decides on size.
                 warnings.simplefilter("ignore")
                 with Image.open(io.BytesIO(content), formats=self._formats) as image:
-                    self._check_size(image.size, len(content), where)
+                    self.admit(image.size, len(content), where)
                     return convert(image)
         except SceneFileError:
             raise
@@ -82,7 +78,18 @@ class ImageDecoder:
             )
             raise SceneFileError(f"{where}: image {cause}") from error
 
-    def _check_size(self, size: tuple[int, int], encoded: int, where: str) -> None:
+    def admit(self, size: tuple[int, int], encoded: int, where: str) -> None:
+        """Count an image of the scene before it is decoded.
+
+        Args:
+            size: width and height in texels, as its header says.
+            encoded: bytes of its file.
+            where: the place in the file, for messages.
+
+        Raises:
+            SceneFileError: the image is too large, or all so far are together.
+        """
+        _check_length(encoded, where)
         width, height = size
         if max(size) > MAX_IMAGE_SIDE or width * height > MAX_IMAGE_TEXELS:
             raise SceneFileError(
@@ -105,6 +112,13 @@ class ImageDecoder:
                 f"{where}: the images of this scene must have at most {most:,} texels together, and with "
                 f"{what} they have {self._texels:,}"
             )
+
+
+def _check_length(encoded: int, where: str) -> None:
+    if encoded > MAX_IMAGE_BYTES:
+        raise SceneFileError(
+            f"{where}: an image file must have at most {MAX_IMAGE_BYTES >> 20} MiB, got {mebibytes(encoded)}"
+        )
 
 
 def _alpha(image: Image.Image) -> UInt8[np.ndarray, "height width 1"] | None:

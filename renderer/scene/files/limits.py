@@ -23,6 +23,9 @@ MAX_NODES = 1 << 17
 MAX_INSTANCES = 10_000
 """A choice. Each instance is a draw call in every pass."""
 
+MAX_PLACED_VERTICES = 1 << 27
+"""A choice: vertices of all instances, a mesh's once for each. Bounding that many takes 0.5 s."""
+
 MAX_CAMERAS = 10_000
 """A choice. Each takes about 30 µs to place."""
 
@@ -37,6 +40,12 @@ DRACO_SECONDS = 1
 
 DRACO_BYTES_PER_SECOND = 1 << 18
 """A choice: further time for its length. Measured: 22 MB/s; a slow machine has a factor of eighty."""
+
+KTX2_SECONDS = 1
+"""A choice: processor time that decoding a KTX2 image may take whatever its size."""
+
+KTX2_TEXELS_PER_SECOND = 1 << 22
+"""A choice: further time for its texels. Measured: 90 million/s; a slow machine has a factor of twenty."""
 
 VERTEX_CHUNK = 1 << 18
 """A choice: vertices skinned at a time. It keeps the matrices of a large mesh below about 100 MiB."""
@@ -74,11 +83,15 @@ LARGEST_COORDINATE = 1e12
 LARGEST_NORMAL = 3.4e38
 """Largest component of a normal before it is scaled to unit length: any that float32 can hold."""
 
+LARGEST_UV = 1e9
+"""Largest texture coordinate. A choice: beyond 1e7, float32 cannot tell texels apart."""
+
 SMALLEST_EXTENT = 1e-12
 """Smallest diagonal of a scene in world units. A choice, like the largest coordinate."""
 
 LARGEST_RADIOMETRIC = 1e18
-"""A choice: largest intensity of a light, W/sr or W/m². Times any albedo and area it is finite in float32."""
+"""A choice: largest intensity of a light as it is drawn (`working_scale`), W/sr or W/m². Times any albedo and
+area it is finite in float32."""
 
 
 class DecodedBytes:

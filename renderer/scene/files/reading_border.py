@@ -7,8 +7,9 @@ import numpy as np
 
 from vpltune.renderer.errors import InputError, MachineError
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, one_line
-from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, SMALLEST_EXTENT
+from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, MAX_PLACED_VERTICES, SMALLEST_EXTENT
 from vpltune.renderer.scene.scene import Scene
+from vpltune.renderer.scene.working_scale import too_strong
 
 
 def read_at_border(path: Path | str, read: Callable[[], Scene]) -> Scene:
@@ -33,6 +34,19 @@ def read_at_border(path: Path | str, read: Callable[[], Scene]) -> Scene:
     return scene
 
 
+def require_few_placed(scene: Scene) -> None:
+    """Check how many vertices the instances place, before anything is done for each.
+
+    Raises:
+        SceneFileError: they are more than `MAX_PLACED_VERTICES`.
+    """
+    placed = sum(len(scene.meshes[instance.mesh].positions) for instance in scene.instances)
+    if placed > MAX_PLACED_VERTICES:
+        raise SceneFileError(
+            f"its instances must place at most {MAX_PLACED_VERTICES:,} vertices together, got {placed:,}"
+        )
+
+
 def _cause(error: Exception) -> str:
     """What is wrong with the file, whatever a reader or a library below it raised."""
     if isinstance(error, SceneFileError):
@@ -48,6 +62,7 @@ def _check(scene: Scene) -> None:
     if not scene.instances:
         hints = f" ({'; '.join(scene.warnings)})" if scene.warnings else ""
         raise SceneFileError(f"the scene has no triangles{hints}")
+    require_few_placed(scene)
     low, high = scene.bounds()
     if not max(np.abs(low).max(), np.abs(high).max()) <= LARGEST_COORDINATE:
         raise SceneFileError(
@@ -56,3 +71,6 @@ def _check(scene: Scene) -> None:
     extent = float(np.linalg.norm(high - low))
     if not extent >= SMALLEST_EXTENT:
         raise SceneFileError(f"the scene must be at least {SMALLEST_EXTENT:g} across, got {extent:g}")
+    fault = too_strong(scene.lights, extent)
+    if fault is not None:
+        raise SceneFileError(fault)

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int64
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
-from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, LARGEST_NORMAL, DecodedBytes
+from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, LARGEST_NORMAL, LARGEST_UV, DecodedBytes
 from vpltune.renderer.scene.scene import Mesh
 from vpltune.renderer.scene.scene_animation import Skinning
 
@@ -49,16 +49,9 @@ def finished_mesh(
     Raises:
         SceneFileError: a coordinate is not finite or too large, or the memory limit is exceeded.
     """
-    for values, what, largest in (
-        (surface.positions, "positions", LARGEST_COORDINATE),
-        (surface.normals, "normals", LARGEST_NORMAL),
-        (surface.uv, "uv", 1e9),
-    ):
-        if values is not None and values.size and not np.abs(values).max() <= largest:
-            wrong = values[~(np.abs(values) <= largest)][0]
-            raise SceneFileError(
-                f"{where}: {what} must be finite and at most {largest:g} in magnitude, got {wrong:g}"
-            )
+    require_within(surface.positions, "positions", LARGEST_COORDINATE, where)
+    require_within(surface.normals, "normals", LARGEST_NORMAL, where)
+    require_within(surface.uv, "uv", LARGEST_UV, where)
     face_normals, has_area = _face_normals(surface.positions, surface.triangles)
     if not has_area.any():
         return None
@@ -87,6 +80,19 @@ def finished_mesh(
     if surface.skinning is not None:
         decoded.spend(sum(array.nbytes for array in vars(surface.skinning).values()), where)
     return Mesh(name, surface.positions, normals, uv, colors, triangles, material, surface.skinning)
+
+
+def require_within(values: np.ndarray | None, what: str, largest: float, where: str) -> None:
+    """Check that no number, if there are any, is larger than `largest` in magnitude.
+
+    Raises:
+        SceneFileError: one is, or is not finite. The message names `where` and `what`.
+    """
+    if values is not None and values.size and not np.abs(values).max() <= largest:
+        wrong = values[~(np.abs(values) <= largest)][0]
+        raise SceneFileError(
+            f"{where}: {what} must be finite and at most {largest:g} in magnitude, got {wrong:g}"
+        )
 
 
 def used_vertices(

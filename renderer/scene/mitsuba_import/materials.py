@@ -11,6 +11,7 @@ from vpltune.renderer.scene.files.image_texels import MTL_FORMATS, ImageDecoder
 from vpltune.renderer.scene.files.opacity import say_blended, without_idle_alpha
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
 from vpltune.renderer.scene.files.texel_products import of_size
+from vpltune.renderer.scene.mitsuba_import.environment_map import exr_channels
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
 from vpltune.renderer.scene.scene import Material, Texture, Wrap
 
@@ -33,6 +34,10 @@ _DIFFUSE_NAMES = {
 _GLASS = ("dielectric", "thindielectric", "roughdielectric", "null")
 # A choice: side of a checkerboard image in texels. Bilinear filtering blurs its edges by one texel.
 _CHECKER_TEXELS = 64
+# Mitsuba's defaults for its fields.
+_COLOR0, _COLOR1 = (0.4, 0.4, 0.4), (0.2, 0.2, 0.2)
+# A choice: rows of an image averaged at a time, which are a few MiB.
+_MEAN_ROWS = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +60,9 @@ class MaterialReader:
         self._warnings = warnings
         self._images = ImageDecoder(MTL_FORMATS)
         self._decoded: dict[tuple[str, bool], UInt8[np.ndarray, "height width 3"]] = {}
+        self._means: dict[tuple[str, bool], np.ndarray] = {}
+        self._textured_with: dict[tuple[int, Wrap], int] = {}
+        self._default = Plugin("bsdf", "diffuse", "a shape without a material")
         self._made: dict[int, Surfacing | None] = {}
         self._kept: list[Plugin] = []
 
@@ -68,11 +76,33 @@ class MaterialReader:
             SceneFileError: the material or texture type is unsupported, or a texture cannot be read.
         """
         if bsdf is None:
-            bsdf = Plugin("bsdf", "diffuse", "a shape without a material")
+            bsdf = self._default
         if id(bsdf) not in self._made:
             self._kept.append(bsdf)  # keep the object alive, so that its id stays unique
             self._made[id(bsdf)] = self._diffuse_part(bsdf)
         return self._made[id(bsdf)]
+
+    def mean_color(self, texture: Plugin) -> Float64[np.ndarray, "3"]:
+        """The mean of a texture's linear values over all texels.
+
+        Raises:
+            SceneFileError: the texture type is unsupported, or its image cannot be read.
+        """
+        if texture.type == "scale":
+            return self.mean_color(_scaled(texture)) * texture.vector("scale", (1.0, 1.0, 1.0))
+        if texture.type == "checkerboard":
+            return (texture.vector("color0", _COLOR0) + texture.vector("color1", _COLOR1)) / 2.0
+        _check_bitmap(texture)
+        name, is_raw = texture.text("filename"), texture.flag("raw", False)
+        if (name, is_raw) not in self._means:
+            if name.lower().endswith(".exr"):
+                content = self._folder.read(name, texture.where)
+                channels = exr_channels(content, f"{texture.where}: {name!r:.80}")
+                mean = np.array([channel.mean(dtype=np.float64) for channel in channels])
+            else:
+                mean = _linear_mean(self._texels(texture))
+            self._means[name, is_raw] = mean
+        return self._means[name, is_raw]
 
     def _diffuse_part(self, bsdf: Plugin) -> Surfacing | None:
         name = bsdf.type
@@ -122,7 +152,7 @@ class MaterialReader:
             return None
         material = self.materials[inner.material]
         texture = None if material.texture is None else self.textures[material.texture]
-        number, to_uv = 1.0, inner.to_uv
+        number, to_uv, index = 1.0, inner.to_uv, material.texture
         opacity = mask.child("opacity")
         if opacity is None or opacity.kind != "texture":
             number = min(max(float(mask.vector("opacity", (0.5, 0.5, 0.5)).mean()), 0.0), 1.0)
@@ -136,8 +166,8 @@ class MaterialReader:
             linear = linear_from_srgb(self._texels(opacity)[..., 0] / 255.0)
             plane, to_uv = np.round(255.0 * linear).astype(np.uint8), _to_uv(opacity)
             texture = _with_opacity(texture, plane, self._images, mask.where)
+            index = len(self.textures)
             self.textures.append(texture)
-        index = None if texture is None else material.texture if number < 1.0 else len(self.textures) - 1
         masked = replace(material, texture=index, alpha_mode="blend", opacity=number)
         masked = without_idle_alpha(masked, texture)
         say_blended(masked, self._warnings)
@@ -169,15 +199,12 @@ class MaterialReader:
 
     def _textured(self, name: str, texture: Plugin, factor: Float64[np.ndarray, "3"]) -> Surfacing:
         if texture.type == "scale":
-            within = texture.of_kind("texture")
-            if not within:
-                raise SceneFileError(f"{texture.where}: must contain a texture")
-            return self._textured(name, within[0], factor * texture.vector("scale", (1.0, 1.0, 1.0)))
+            factor = factor * texture.vector("scale", (1.0, 1.0, 1.0))
+            return self._textured(name, _scaled(texture), factor)
         to_uv = _to_uv(texture)
         if texture.type == "checkerboard":
             return self._add(name, factor, self._checkerboard(texture), to_uv)
-        if texture.type != "bitmap":
-            raise SceneFileError(f"{texture.where}: unsupported texture type; must be bitmap or checkerboard")
+        _check_bitmap(texture)
         if texture.text("filter_type", "bilinear") == "nearest":
             self._warnings.add(
                 "textures are filtered bilinearly, although the scene asks for nearest filtering"
@@ -188,10 +215,12 @@ class MaterialReader:
                 f"{texture.where}: wrap_mode must be one of {', '.join(_WRAPS)}, got {wrap!r:.40}"
             )
         texels = self._texels(texture)
-        self.textures.append(
-            Texture(label(texture.text("filename"), "texture"), texels, _WRAPS[wrap], _WRAPS[wrap])
-        )
-        return self._add(name, factor, len(self.textures) - 1, to_uv)
+        key = (id(texels), _WRAPS[wrap])
+        if key not in self._textured_with:
+            self._textured_with[key] = len(self.textures)
+            of_file = label(texture.text("filename"), "texture")
+            self.textures.append(Texture(of_file, texels, _WRAPS[wrap], _WRAPS[wrap]))
+        return self._add(name, factor, self._textured_with[key], to_uv)
 
     def _texels(self, texture: Plugin) -> UInt8[np.ndarray, "height width 3"]:
         name, is_raw = texture.text("filename"), texture.flag("raw", False)
@@ -204,8 +233,7 @@ class MaterialReader:
         return self._decoded[name, is_raw]
 
     def _checkerboard(self, texture: Plugin) -> int:
-        dark = texture.vector("color0", (0.4, 0.4, 0.4))
-        bright = texture.vector("color1", (0.2, 0.2, 0.2))
+        dark, bright = texture.vector("color0", _COLOR0), texture.vector("color1", _COLOR1)
         half = np.arange(_CHECKER_TEXELS) < _CHECKER_TEXELS // 2
         fields = np.where((half[:, None] == half[None, :])[..., None], dark, bright)
         texels = np.round(255.0 * srgb_from_linear(np.clip(fields, 0.0, 1.0))).astype(np.uint8)
@@ -237,6 +265,36 @@ def _with_opacity(
     if texture is None:
         return Texture("mask", np.full((height, width, 3), 255, np.uint8), opacity=opacity)
     return replace(texture, texels_srgb=of_size(texture.texels_srgb, width, height), opacity=opacity)
+
+
+def texture_name(texture: Plugin) -> str:
+    """What a texture is called in messages: its file, or else its type."""
+    if texture.type == "scale":
+        return texture_name(_scaled(texture))
+    return repr(label(texture.text("filename", texture.type), "?"))
+
+
+def _scaled(texture: Plugin) -> Plugin:
+    """The texture within one of the type 'scale'."""
+    within = texture.of_kind("texture")
+    if not within:
+        raise SceneFileError(f"{texture.where}: must contain a texture")
+    return within[0]
+
+
+def _check_bitmap(texture: Plugin) -> None:
+    if texture.type != "bitmap":
+        raise SceneFileError(f"{texture.where}: unsupported texture type; must be bitmap or checkerboard")
+
+
+def _linear_mean(texels_srgb: UInt8[np.ndarray, "height width 3"]) -> Float64[np.ndarray, "3"]:
+    linear = linear_from_srgb(np.arange(256) / 255.0)
+    height, width, _ = texels_srgb.shape
+    total = np.zeros(3)
+    for top in range(0, height, _MEAN_ROWS):
+        strip = texels_srgb[top : top + _MEAN_ROWS].reshape(-1, 3)
+        total += [np.bincount(channel, minlength=256) @ linear for channel in strip.T]
+    return total / (height * width)
 
 
 def _to_uv(texture: Plugin) -> Float64[np.ndarray, "3 3"]:

@@ -8,17 +8,24 @@ import numpy as np
 from jaxtyping import Float64
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
-from vpltune.renderer.scene.files.limits import LARGEST_RADIOMETRIC, MAX_INSTANCES, DecodedBytes
+from vpltune.renderer.scene.files.limits import LARGEST_UV, MAX_INSTANCES, DecodedBytes
 from vpltune.renderer.scene.files.plain_numbers import plain_number
-from vpltune.renderer.scene.files.reading_border import read_at_border
-from vpltune.renderer.scene.files.surface import finished_mesh
-from vpltune.renderer.scene.mitsuba_import.emitters import area_emitter, punctual_light, strongest
+from vpltune.renderer.scene.files.reading_border import read_at_border, require_few_placed
+from vpltune.renderer.scene.files.surface import require_within
+from vpltune.renderer.scene.mitsuba_import.emitters import (
+    Facets,
+    area_emitter,
+    area_radiance,
+    mesh_facets,
+    punctual_light,
+    strongest,
+)
 from vpltune.renderer.scene.mitsuba_import.materials import MaterialReader, Surfacing
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin, plugin_tree
 from vpltune.renderer.scene.mitsuba_import.searched_folder import SearchedFolder
-from vpltune.renderer.scene.mitsuba_import.shapes import Shape, shape_triangles
+from vpltune.renderer.scene.mitsuba_import.shapes import ShapeReader
 from vpltune.renderer.scene.mitsuba_import.xml_tree import parse_xml
-from vpltune.renderer.scene.scene import Camera, Instance, Light, Mesh, Scene, transform_points, without_scale
+from vpltune.renderer.scene.scene import Camera, Instance, Light, Mesh, Scene, without_scale
 
 # Top-level plugins that do not affect the imported scene, or only through others: no warning for these.
 _SILENT = ("integrator", "sampler", "film", "rfilter", "bsdf", "texture")
@@ -45,11 +52,15 @@ class _Import:
     meshes: list[Mesh] = field(default_factory=list)
     instances: list[Instance] = field(default_factory=list)
     lights: list[tuple[Light, float]] = field(default_factory=list)
+    surfaced: dict[int, dict[int, int]] = field(default_factory=dict)
+    facets: dict[int, Facets] = field(default_factory=dict)
     groups: dict[int, list[tuple[int, Float64[np.ndarray, "4 4"]]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.folder = SearchedFolder(self.path)
         self.materials = MaterialReader(self.folder, self.warnings)
+        # It keeps its meshes, so that their ids stay unique.
+        self.shape_reader = ShapeReader(self.folder, self.warnings, self.decoded)
 
     def scene(self) -> Scene:
         root = plugin_tree(parse_xml(self.folder.read_scene_file(self.path)))
@@ -74,13 +85,13 @@ class _Import:
             materials=tuple(self.materials.materials),
             textures=tuple(self.materials.textures),
         )
+        require_few_placed(scene)
         low, high = scene.bounds()
         extent = float(np.linalg.norm(high - low))
         for emitter in root.of_kind("emitter"):
             found = punctual_light(emitter, self.folder, extent, self.warnings)
             if found is not None:
                 self.lights.append(found)
-        self._check_lights()
         self._warn_unread(root)
         cameras = tuple(camera for sensor in root.of_kind("sensor") if (camera := self._camera(sensor)))
         if not self.lights:
@@ -94,57 +105,46 @@ class _Import:
 
     def _mesh(self, plugin: Plugin) -> tuple[int, Float64[np.ndarray, "4 4"]] | None:
         """Index of the shape's mesh and its transform to world; None if no surface is left."""
-        shape = shape_triangles(plugin, self.folder, self.warnings)
+        shape = self.shape_reader.read(plugin)
         if shape is None:
-            self._warn_no_area()
+            self.warnings.tally(
+                "1 shape has no triangle with area; it is left out",
+                "{n} shapes have no triangle with area; they are left out",
+            )
             return None
         to_world = plugin.to_world() @ shape.to_shape
-        hidden = self._add_area_light(plugin, shape, to_world)
+        hidden = self._add_area_light(plugin, shape.mesh, to_world)
         surfacing = self.materials.surfacing(next(iter(plugin.of_kind("bsdf")), None))
         if surfacing is None or hidden:
             return None
-        mesh = self._finished(plugin, shape, surfacing)
-        if mesh is None:
-            self._warn_no_area()
-            return None
-        self.meshes.append(mesh)
-        return len(self.meshes) - 1, to_world
+        return self._surfaced(plugin, shape.mesh, surfacing), to_world
 
-    def _check_lights(self) -> None:
-        for light, _ in self.lights:
-            strongest_channel = float(light.intensity.max())
-            if not strongest_channel <= LARGEST_RADIOMETRIC:
-                raise SceneFileError(
-                    f"{light.name}: its intensity must be at most {LARGEST_RADIOMETRIC:g}, "
-                    f"got {strongest_channel:g}"
-                )
+    def _surfaced(self, plugin: Plugin, mesh: Mesh, surfacing: Surfacing) -> int:
+        """Index of the mesh with a material. Shapes that have both in common share it."""
+        of_mesh = self.surfaced.setdefault(id(mesh), {})
+        if surfacing.material not in of_mesh:
+            if of_mesh:
+                arrays = (mesh.positions, mesh.normals, mesh.uv, mesh.triangles)
+                self.decoded.spend(sum(array.nbytes for array in arrays), plugin.where)
+            uv = (mesh.uv @ surfacing.to_uv[:2, :2].T + surfacing.to_uv[:2, 2]).astype(np.float32)
+            require_within(uv, "uv", LARGEST_UV, plugin.where)
+            of_mesh[surfacing.material] = len(self.meshes)
+            self.meshes.append(replace(mesh, material=surfacing.material, uv=uv))
+        return of_mesh[surfacing.material]
 
-    def _warn_no_area(self) -> None:
-        self.warnings.tally(
-            "1 shape has no triangle with area; it is left out",
-            "{n} shapes have no triangle with area; they are left out",
-        )
-
-    def _finished(self, plugin: Plugin, shape: Shape, surfacing: Surfacing) -> Mesh | None:
-        surface = shape.surface
-        if surface.uv is not None:
-            uv = surface.uv @ surfacing.to_uv[:2, :2].T + surfacing.to_uv[:2, 2]
-            surface = replace(surface, uv=uv.astype(np.float32))
-        name = Path(plugin.text("filename", plugin.type)).stem
-        return finished_mesh(surface, name, surfacing.material, self.decoded, plugin.where)
-
-    def _add_area_light(self, plugin: Plugin, shape: Shape, to_world: Float64[np.ndarray, "4 4"]) -> bool:
+    def _add_area_light(self, plugin: Plugin, mesh: Mesh, to_world: Float64[np.ndarray, "4 4"]) -> bool:
         """Add the light of an emitting shape. True if its surface encloses the light and must be removed."""
         emitters = plugin.of_kind("emitter")
         if not emitters:
             return False
-        surface = shape.surface
-        corners = transform_points(to_world, surface.positions)[surface.triangles]
         outwards = -1.0 if plugin.flag("flip_normals", False) else 1.0
         if plugin.type not in ("obj", "ply", "cube") and np.linalg.det(to_world[:3, :3]) < 0.0:
             # Mitsuba transforms normals of analytic shapes; those of meshes follow the mirrored winding.
             outwards = -outwards
-        found = area_emitter(emitters[0], corners, outwards)
+        if id(mesh) not in self.facets:
+            self.facets[id(mesh)] = mesh_facets(mesh)
+        radiance = area_radiance(emitters[0], self.materials, self.warnings)
+        found = area_emitter(radiance, self.facets[id(mesh)], to_world, outwards)
         if found is None:
             return False
         kind = found.light.kind

@@ -2,14 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
+from vpltune.renderer.scene.files.limits import DecodedBytes
 from vpltune.renderer.scene.files.obj_scene import read_obj
 from vpltune.renderer.scene.files.ply_scene import read_ply
-from vpltune.renderer.scene.files.surface import Surface
+from vpltune.renderer.scene.files.surface import Surface, finished_mesh
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
 from vpltune.renderer.scene.mitsuba_import.searched_folder import SearchedFolder
 from vpltune.renderer.scene.scene import Mesh
@@ -22,65 +24,90 @@ _SIDES = 80
 class Shape:
     """Triangles, and the transform from the shape's parameters that is applied before `to_world`."""
 
-    surface: Surface
+    mesh: Mesh
+    """The same object for all shapes that differ in their transform and material alone. Its material is 0."""
     to_shape: Float64[np.ndarray, "4 4"]
     """Such as the centre and radius of a sphere; the identity if there are none."""
 
 
-def shape_triangles(shape: Plugin, folder: SearchedFolder, warnings: Warnings) -> Shape | None:
-    """The triangles of a shape. The origin of texture coordinates is at the top left, as in Mitsuba and glTF.
+class ShapeReader:
+    """Gives the triangles of shapes, and reads each mesh file once.
 
     Args:
-        shape: the plugin.
         folder: where mesh files are looked for.
         warnings: takes a line for each approximation.
-
-    Returns:
-        None if a mesh file has no triangle with area.
-
-    Raises:
-        SceneFileError: the shape type is unsupported, a value is invalid, or a mesh file cannot be read.
+        decoded: the memory limit.
     """
-    if shape.type in ("obj", "ply"):
-        surface = _from_file(shape, folder, warnings)
-        return None if surface is None else Shape(surface, np.eye(4))
-    make = _ANALYTIC.get(shape.type)
-    if make is None:
-        known = ", ".join(("obj", "ply", *_ANALYTIC))
-        raise SceneFileError(f"{shape.where}: unsupported shape type; must be one of {known}")
-    made = make(shape)
-    if shape.flag("face_normals", False):
-        made = replace(made, surface=replace(made.surface, normals=None))
-    return made
 
+    def __init__(self, folder: SearchedFolder, warnings: Warnings, decoded: DecodedBytes) -> None:
+        self._folder = folder
+        self._warnings = warnings
+        self._decoded = decoded
+        self._made: dict[tuple[object, ...], Mesh | None] = {}
 
-def _from_file(shape: Plugin, folder: SearchedFolder, warnings: Warnings) -> Surface | None:
-    name = shape.text("filename")
-    if not folder.has(name, shape.where):
-        raise SceneFileError(f"{shape.where}: {name!r:.80} does not exist")
-    reader = read_obj if shape.type == "obj" else read_ply
-    said = Warnings()
-    try:
-        scene = reader(folder.found(name, shape.where), said)
-    except SceneFileError as error:
-        raise SceneFileError(f"{shape.where}: {name!r:.80}: {error}") from error
-    for line in scene.warnings:
-        # Materials in the file are not used: the scene has its own.
-        if "material" not in line and "mtl" not in line and "texture" not in line:
-            warnings.add(f"{name!r:.80}: {line}")
-    meshes = scene.meshes
-    if not meshes:
-        return None
-    surface = _joined(meshes)
-    if shape.type == "ply" and surface.uv is not None:
-        # Our PLY reader flips v, as most programs that write PLY expect. Mitsuba does not, so undo it.
-        surface = replace(surface, uv=_flipped_v(surface.uv))
-    flipped = shape.flag("flip_tex_coords", shape.type == "obj")
-    if flipped != (shape.type == "obj") and surface.uv is not None:
-        surface = replace(surface, uv=_flipped_v(surface.uv))
-    if shape.flag("face_normals", False):
-        return replace(surface, normals=None)
-    return _smoothed(surface) if _is_flat(surface) else surface
+    def read(self, shape: Plugin) -> Shape | None:
+        """The triangles of a shape; None if no triangle has area.
+
+        The origin of texture coordinates is at the top left, as in Mitsuba and glTF.
+
+        Raises:
+            SceneFileError: the shape type is unsupported, a value is invalid, a mesh file cannot be read, or
+                the memory limit is exceeded.
+        """
+        flat = shape.flag("face_normals", False)
+        if shape.type in ("obj", "ply"):
+            path = self._found(shape)
+            flipped = shape.flag("flip_tex_coords", shape.type == "obj") != (shape.type == "obj")
+            key: tuple[object, ...] = (shape.type, path, flipped, flat)
+            if key not in self._made:
+                surface = self._from_file(shape, path, flipped, flat)
+                self._made[key] = self._finished(surface, path.stem, shape)
+            to_shape = np.eye(4)
+        else:
+            if shape.type not in _UNIT_SURFACES:
+                known = ", ".join(("obj", "ply", *_UNIT_SURFACES))
+                raise SceneFileError(f"{shape.where}: unsupported shape type; must be one of {known}")
+            key = (shape.type, flat)
+            if key not in self._made:
+                surface = _UNIT_SURFACES[shape.type]()
+                surface = replace(surface, normals=None) if flat else surface
+                self._made[key] = self._finished(surface, shape.type, shape)
+            to_shape = _TO_SHAPE.get(shape.type, _as_it_is)(shape)
+        mesh = self._made[key]
+        return None if mesh is None else Shape(mesh, to_shape)
+
+    def _finished(self, surface: Surface | None, name: str, shape: Plugin) -> Mesh | None:
+        return None if surface is None else finished_mesh(surface, name, 0, self._decoded, shape.where)
+
+    def _found(self, shape: Plugin) -> Path:
+        name = shape.text("filename")
+        if not self._folder.has(name, shape.where):
+            raise SceneFileError(f"{shape.where}: {name!r:.80} does not exist")
+        return self._folder.found(name, shape.where)
+
+    def _from_file(self, shape: Plugin, path: Path, flipped: bool, flat: bool) -> Surface | None:
+        name = shape.text("filename")
+        reader = read_obj if shape.type == "obj" else read_ply
+        said = Warnings()
+        try:
+            scene = reader(path, said)
+        except SceneFileError as error:
+            raise SceneFileError(f"{shape.where}: {name!r:.80}: {error}") from error
+        for line in scene.warnings:
+            # Materials in the file are not used: the scene has its own.
+            if "material" not in line and "mtl" not in line and "texture" not in line:
+                self._warnings.add(f"{name!r:.80}: {line}")
+        if not scene.meshes:
+            return None
+        surface = _joined(scene.meshes)
+        if shape.type == "ply" and surface.uv is not None:
+            # Our PLY reader flips v, as most programs that write PLY expect. Mitsuba does not, so undo it.
+            surface = replace(surface, uv=_flipped_v(surface.uv))
+        if flipped and surface.uv is not None:
+            surface = replace(surface, uv=_flipped_v(surface.uv))
+        if flat:
+            return replace(surface, normals=None)
+        return _smoothed(surface) if _is_flat(surface) else surface
 
 
 def _flipped_v(uv: np.ndarray) -> np.ndarray:
@@ -129,14 +156,14 @@ def _smoothed(surface: Surface) -> Surface:
     return Surface(surface.positions[first], triangles, normals.astype(np.float32), surface.uv[first])
 
 
-def _rectangle(shape: Plugin) -> Shape:
+def _rectangle() -> Surface:
     corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float64)
     triangles = np.array([[0, 1, 2], [0, 2, 3]])
     normals = np.tile((0.0, 0.0, 1.0), (4, 1))
-    return Shape(_surface(corners, triangles, normals, (corners[:, :2] + 1.0) / 2.0), np.eye(4))
+    return _surface(corners, triangles, normals, (corners[:, :2] + 1.0) / 2.0)
 
 
-def _cube(shape: Plugin) -> Shape:
+def _cube() -> Surface:
     """The cube [−1, 1]³ with the texture coordinates of Mitsuba's cube."""
     uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float64)
     faces = np.array(
@@ -153,40 +180,50 @@ def _cube(shape: Plugin) -> Shape:
     starts = 4 * np.arange(6)[:, None, None]
     triangles = (starts + np.array([[0, 1, 2], [3, 0, 2]])).reshape(-1, 3)
     normals = np.repeat(faces.mean(axis=1), 4, axis=0)
-    return Shape(_surface(faces.reshape(-1, 3), triangles, normals, np.tile(uv, (6, 1))), np.eye(4))
+    return _surface(faces.reshape(-1, 3), triangles, normals, np.tile(uv, (6, 1)))
 
 
-def _sphere(shape: Plugin) -> Shape:
+def _sphere() -> Surface:
     u, v = np.meshgrid(np.arange(_SIDES + 1) / _SIDES, np.arange(_SIDES // 2 + 1) / (_SIDES // 2))
     azimuth, polar = 2.0 * np.pi * u, np.pi * v
     points = np.stack(
         [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], axis=-1
     ).reshape(-1, 3)
     uv = np.stack([u, v], axis=-1).reshape(-1, 2)
-    to_shape = np.diag([*[shape.number("radius", 1.0)] * 3, 1.0])
-    to_shape[:3, 3] = shape.vector("center", (0.0, 0.0, 0.0))
     # Rows go down and columns go left, seen from outside, so reverse the winding.
-    return Shape(
-        _surface(points, _grid(_SIDES // 2, _SIDES)[:, ::-1], points, uv), _invertible(to_shape, shape)
-    )
+    return _surface(points, _grid(_SIDES // 2, _SIDES)[:, ::-1], points, uv)
 
 
-def _disk(shape: Plugin) -> Shape:
+def _disk() -> Surface:
     radius, turn = np.meshgrid([0.0, 1.0], np.arange(_SIDES + 1) / _SIDES)
     angle = 2.0 * np.pi * turn
     points = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle], axis=-1).reshape(-1, 3)
     uv = np.stack([radius, turn], axis=-1).reshape(-1, 2)
     normals = np.tile((0.0, 0.0, 1.0), (len(points), 1))
-    return Shape(_surface(points, _grid(_SIDES, 1), normals, uv), np.eye(4))
+    return _surface(points, _grid(_SIDES, 1), normals, uv)
 
 
-def _cylinder(shape: Plugin) -> Shape:
-    """A cylinder from p0 to p1, open at both ends."""
-    start, end = shape.vector("p0", (0.0, 0.0, 0.0)), shape.vector("p1", (0.0, 0.0, 1.0))
+def _cylinder() -> Surface:
+    """A cylinder of radius 1 around Z from 0 to 1, open at both ends."""
     turn, height = np.meshgrid(np.arange(_SIDES + 1) / _SIDES, [0.0, 1.0])
     angle = 2.0 * np.pi * turn
     points = np.stack([np.cos(angle), np.sin(angle), height], axis=-1).reshape(-1, 3)
     uv = np.stack([turn, height], axis=-1).reshape(-1, 2)
+    return _surface(points, _grid(1, _SIDES), points * (1.0, 1.0, 0.0), uv)
+
+
+def _as_it_is(shape: Plugin) -> Float64[np.ndarray, "4 4"]:
+    return np.eye(4)
+
+
+def _center_and_radius(shape: Plugin) -> Float64[np.ndarray, "4 4"]:
+    to_shape = np.diag([*[shape.number("radius", 1.0)] * 3, 1.0])
+    to_shape[:3, 3] = shape.vector("center", (0.0, 0.0, 0.0))
+    return _invertible(to_shape, shape)
+
+
+def _from_p0_to_p1(shape: Plugin) -> Float64[np.ndarray, "4 4"]:
+    start, end = shape.vector("p0", (0.0, 0.0, 0.0)), shape.vector("p1", (0.0, 0.0, 1.0))
     axis, radius = end - start, shape.number("radius", 1.0)
     length = float(np.linalg.norm(axis))
     side = np.zeros(3)
@@ -198,8 +235,7 @@ def _cylinder(shape: Plugin) -> Shape:
         across = np.array([1.0, 0.0, 0.0])
     to_shape[:3, 0], to_shape[:3, 2], to_shape[:3, 3] = radius * across, axis, start
     to_shape[:3, 1] = radius * np.cross(axis / max(length, 1e-300), across)
-    normals = points * (1.0, 1.0, 0.0)
-    return Shape(_surface(points, _grid(1, _SIDES), normals, uv), _invertible(to_shape, shape))
+    return _invertible(to_shape, shape)
 
 
 def _invertible(matrix: Float64[np.ndarray, "4 4"], shape: Plugin) -> Float64[np.ndarray, "4 4"]:
@@ -229,10 +265,14 @@ def _surface(
     return Surface(single(positions), np.ascontiguousarray(triangles), single(normals), single(uv))
 
 
-_ANALYTIC: dict[str, Callable[[Plugin], Shape]] = {
+_UNIT_SURFACES: dict[str, Callable[[], Surface]] = {
     "rectangle": _rectangle,
     "cube": _cube,
     "sphere": _sphere,
     "disk": _disk,
     "cylinder": _cylinder,
+}
+_TO_SHAPE: dict[str, Callable[[Plugin], Float64[np.ndarray, "4 4"]]] = {
+    "sphere": _center_and_radius,
+    "cylinder": _from_p0_to_p1,
 }

@@ -86,3 +86,15 @@ def _sampled_spectrum(node: XmlNode, text: str) -> Float64[np.ndarray, "3"]:
     pairs = np.array(found)
     pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
     return np.array([np.interp(np.linspace(*band, 16), pairs[:, 0], pairs[:, 1]).mean() for band in _BANDS])
+
+
+def unit_direction(vector: Float64[np.ndarray, "3"], where: str) -> Float64[np.ndarray, "3"]:
+    """The vector scaled to unit length; `where` is named in the error.
+
+    Raises:
+        SceneFileError: the vector is zero.
+    """
+    length = float(np.linalg.norm(vector))
+    if not length > 0.0:
+        raise SceneFileError(f"{where}: its direction must not be zero")
+    return vector / length

@@ -27,7 +27,7 @@ from jaxtyping import Float64
 
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.small_text import read_small_text
-from vpltune.renderer.scene.files.limits import LARGEST_RADIOMETRIC
+from vpltune.renderer.scene.files.limits import LARGEST_NUMBER, LARGEST_RADIOMETRIC
 from vpltune.renderer.scene.placement.automatic_camera import default_camera, default_camera_for_lights
 from vpltune.renderer.scene.placement.automatic_light import default_light
 from vpltune.renderer.scene.placement.sidecar_file import near_miss, sidecar_path
@@ -35,6 +35,7 @@ from vpltune.renderer.scene.placement.sight import lit_fraction, seen_by
 from vpltune.renderer.scene.placement.subject import space_of_view
 from vpltune.renderer.scene.scene import Camera, Light, LightKind, Scene, look_at
 from vpltune.renderer.scene.spot_cone import checked_cone
+from vpltune.renderer.scene.working_scale import require_drawable
 
 # A choice: vertical field of view if a camera gives none.
 DEFAULT_YFOV_DEGREES = 60.0
@@ -100,7 +101,8 @@ def resolve_camera_and_lights(
         light_override: goes before any other lights.
 
     Raises:
-        InputError: the sidecar exists but is invalid, or the scene has no triangles.
+        InputError: the sidecar exists but is invalid, a light is too strong for the scene's size, or the
+            scene has no triangles.
     """
     path = sidecar_path(scene_path)
     if path.exists() and not path.is_file():
@@ -112,8 +114,11 @@ def resolve_camera_and_lights(
             notes.append(f"{' and '.join(_mentioned(camera, lights))} taken from {path.name}")
         elif (missed := near_miss(scene_path)) is not None:
             notes.append(f"{missed} is not read: the scene's sidecar would be {path.name}")
+    source = path if light_override is None else scene_path
     camera = camera_override or camera
     lights = light_override if light_override is not None else lights
+    if lights is not None and scene.triangle_count():
+        require_drawable(lights, scene, str(source))
     camera, lights, more = completed_camera_and_lights(scene, scene_path, camera, lights)
     return camera, lights, (*notes, *more)
 
@@ -206,7 +211,9 @@ def _light(table: Any, where: str) -> Light:
     if not isinstance(kind, str) or kind not in LIGHT_KEYS:
         raise InputError(f"{where}: 'type' must be 'spot', 'point' or 'directional', got {kind!r:.60}")
     _check_keys(table, LIGHT_KEYS[kind], where)
-    intensity = _numbers(table, "intensity", (1, 3), where, LARGEST_RADIOMETRIC)
+    # What a point or spot light may have depends on the scene's size, and is checked with it.
+    most = LARGEST_RADIOMETRIC if kind == "directional" else LARGEST_NUMBER
+    intensity = _numbers(table, "intensity", (1, 3), where, most)
     if (intensity < 0.0).any():
         raise InputError(f"{where}: 'intensity' must not be negative, got {intensity.tolist()}")
     placed: dict[str, Any] = {}

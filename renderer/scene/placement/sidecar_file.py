@@ -3,6 +3,8 @@
 import difflib
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,8 @@ SIDECAR_SUFFIX = ".vpltune.toml"
 """What takes the place of the scene's own suffix."""
 # A choice: names and suffixes that are at least this alike (Ratcliff and Obershelp 1988) are taken for slips.
 _ALIKE = 0.85
+# A choice: most names of a folder that every one of its scenes is compared with.
+_MOST_OTHER = 100
 
 
 def sidecar_path(scene_path: Path) -> Path:
@@ -26,28 +30,58 @@ def near_miss(scene_path: Path) -> str | None:
     """The name of a file beside the scene that seems meant as its sidecar, or None.
 
     Such as Room.vpltune.toml, room.vpltune.tml or room.glb.vpltune.toml for room.glb. Sidecars of other
-    scenes are passed over.
+    scenes are passed over. A folder is listed once for all its scenes.
     """
     right = sidecar_path(scene_path)
+    stem = right.name.removesuffix(SIDECAR_SUFFIX).lower()
     try:
-        names = sorted(file.name for file in right.parent.iterdir())
+        slips = _slips(right.parent, right.parent.stat().st_mtime_ns)
     except OSError:
         return None
+    meant = [name for name in slips.by_stem.get(stem, ()) if name != right.name]
+    if not meant and len(stem) > 3:
+        meant = [name for guess, name in slips.other if name != right.name and _alike(guess, stem)]
+    return meant[0] if meant else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Slips:
+    """The files of a folder that look like sidecars, and are that of none of its scenes."""
+
+    by_stem: dict[str, list[str]]
+    """By the lower-case stem of the scene that they seem to be for."""
+    other: list[tuple[str, str]]
+    """Stem and name of those for which there is no scene of this stem."""
+
+
+@lru_cache(maxsize=1)
+def _slips(folder: Path, changed_ns: int) -> _Slips:
+    """Those of a folder that was last changed at this time."""
+    names = sorted(file.name for file in folder.iterdir())
     stems = {Path(name).stem for name in names if name.lower().endswith(SCENE_SUFFIXES)}
-    return next((name for name in names if name != right.name and _is_slip(name, right, stems)), None)
+    lower_stems = {stem.lower() for stem in stems}
+    slips = _Slips({}, [])
+    for name in names:
+        guess = _meant_stem(name)
+        if guess is None or (name.endswith(SIDECAR_SUFFIX) and name.removesuffix(SIDECAR_SUFFIX) in stems):
+            continue
+        slips.by_stem.setdefault(guess, []).append(name)
+        if guess not in lower_stems and ".vpl" in name.lower() and len(slips.other) < _MOST_OTHER:
+            slips.other.append((guess, name))
+    return slips
 
 
-def _is_slip(name: str, right: Path, stems: set[str]) -> bool:
-    lower, stem = name.lower(), right.name.removesuffix(SIDECAR_SUFFIX)
+def _meant_stem(name: str) -> str | None:
+    """The lower-case stem of the scene that a file seems to be the sidecar of; None if it looks like none."""
+    lower = name.lower()
     first, found, last = lower.partition(".vpl")
     if not found:
-        return lower == f"{stem.lower()}.toml"
-    is_text = ".toml" in last or last.count(".") == 0 or _alike(Path(lower).suffix, ".toml")
-    if not is_text or (name.endswith(SIDECAR_SUFFIX) and name.removesuffix(SIDECAR_SUFFIX) in stems - {stem}):
-        return False
+        return lower.removesuffix(".toml") if lower.endswith(".toml") else None
+    if ".toml" not in last and last.count(".") > 0 and not _alike(Path(lower).suffix, ".toml"):
+        return None
     for suffix in SCENE_SUFFIXES:
         first = first.removesuffix(suffix)
-    return first == stem.lower() or (len(stem) > 3 and _alike(first, stem.lower()))
+    return first
 
 
 def _alike(one: str, other: str) -> bool:

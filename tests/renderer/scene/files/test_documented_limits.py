@@ -26,6 +26,7 @@ ROWS = {
         f"and {limits.FREE_TEXELS:,} with {limits.TEXELS_PER_BYTE} for each byte"
     ),
     "geometry": f"{limits.MAX_DECODED_BYTES // MIB} MiB once decoded",
+    "placed": f"{limits.MAX_PLACED_VERTICES:,} vertices",
     "glTF nodes": (
         f"{limits.MAX_NODES:,}, that place at most {limits.MAX_INSTANCES:,} primitives, "
         f"{limits.MAX_CAMERAS:,} cameras and {limits.MAX_LIGHTS:,} lights"

@@ -11,7 +11,13 @@ from PIL import Image
 from reading_cost import check_cost
 
 from vpltune.renderer.errors import InputError
-from vpltune.renderer.scene.files import gltf_deformation, gltf_draco, gltf_scene, read_scene, scene_reader
+from vpltune.renderer.scene.files import (
+    gltf_deformation,
+    gltf_scene,
+    limited_decoder,
+    read_scene,
+    scene_reader,
+)
 
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
 UP = np.tile(np.array([0, 0, 1], np.float32), (3, 1))
@@ -64,7 +70,7 @@ class TestDraco:
     def test_the_end_of_the_decoder_is_told_by_its_cause(self, gltf, tmp_path, monkeypatch, fault, cause):
         program = tmp_path / "program.py"
         program.write_text(f"import os, signal, sys\nsys.stdin.buffer.readline()\n{fault}\n")
-        monkeypatch.setattr(gltf_draco, "_PROGRAM", program)
+        monkeypatch.setattr(limited_decoder, "_PROGRAM", program)
         with pytest.raises(InputError, match=rf"Draco cannot decode it \({cause}\)"):
             read_scene(self.write(gltf, b"DRACO"))
 

@@ -55,8 +55,12 @@ def test_point_and_directional(triangle, kind):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"intensity": -1}, r"lights\[0\]\.intensity: must be a finite number from 0 to 1e\+18, got -1"),
-        ({"intensity": 1e25}, r"lights\[0\]\.intensity: must be a finite number"),
+        ({"intensity": -1}, r"lights\[0\]\.intensity: must be a finite number from 0 to 1e\+30, got -1"),
+        ({"intensity": 1e31}, r"lights\[0\]\.intensity: must be a finite number"),
+        (
+            {"intensity": 1e19},
+            r"intensity must be at most 1e\+18 W/sr in a scene 1\.41 units",
+        ),
         ({"color": [1, -1, 1]}, r"lights\[0\]\.color: must not be negative"),
         ({"color": [1, 1]}, r"lights\[0\]\.color: must be a list of 3 finite numbers"),
         ({"type": "laser"}, r"lights\[0\]\.type: must be 'point', 'spot' or 'directional', got 'laser'"),

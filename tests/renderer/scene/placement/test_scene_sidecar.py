@@ -1,6 +1,8 @@
 """The sidecar beside a scene, and the precedence of flags, sidecar, scene file and automatic choice."""
 
 import math
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from scene_paths import OWN_SCENES
 
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.placement import resolve_camera_and_lights
+from vpltune.renderer.scene.placement import resolve_camera_and_lights, sidecar_file
 from vpltune.renderer.scene.placement.free_space import free_space
 from vpltune.renderer.scene.placement.scene_sidecar import read_sidecar
 from vpltune.renderer.scene.placement.sidecar_file import near_miss, sidecar_path, sidecar_text
@@ -87,7 +89,7 @@ def test_point_and_directional(tmp_path):
         (SPOT.replace("[[light]]", "[light]"), r"lights must be written as \[\[light\]\] tables"),
         (SPOT.replace("intensity = 10", "intensity = -1"), "'intensity' must not be negative"),
         (SPOT.replace("intensity = 10", "intensity = inf"), "'intensity' must be 1 or 3 finite numbers"),
-        (SPOT.replace("intensity = 10", "intensity = 1e19"), r"'intensity' .*at most 1e\+18 each"),
+        (SPOT.replace("intensity = 10", "intensity = 1e31"), r"'intensity' .*at most 1e\+30 each"),
         (SPOT.replace("= 30", "= 70"), r"cone angles must satisfy 0 ≤ inner ≤ outer ≤ 90 degrees"),
         (SPOT + "direction = [0, -1, 0]\n", "must have either 'direction' or 'look_at', got both"),
         (SPOT.replace("[0.0, 0.0, 2.0]", "[0.0, 2.0, 0.0]"), "direction must not be zero"),
@@ -200,6 +202,34 @@ def test_other_files_beside_a_scene_are_no_near_misses(tmp_path, name):
     for file in ("room.glb", "rooms.obj", name):
         (tmp_path / file).touch()
     assert near_miss(tmp_path / "room.glb") is None
+
+
+def test_the_work_for_near_misses_is_linear_in_the_scenes_of_a_folder(tmp_path, monkeypatch):
+    """The folder is listed once, and each scene is compared with a bounded number of names."""
+    count = 1_000
+    for i in range(count):
+        (tmp_path / f"scene {i:04}.glb").touch()
+        (tmp_path / f"SCENE {i:04}.vpltune.toml").touch()
+        (tmp_path / f"other {i:04}.vpltune.tml").touch()
+    listings, comparisons = [], []
+    list_folder, compare = Path.iterdir, sidecar_file._alike
+    monkeypatch.setattr(Path, "iterdir", lambda path: listings.append(path) or list_folder(path))
+    monkeypatch.setattr(sidecar_file, "_alike", lambda *both: comparisons.append(both) or compare(*both))
+    for i in range(count):
+        assert near_miss(tmp_path / f"scene {i:04}.glb") == f"SCENE {i:04}.vpltune.toml"
+        assert near_miss(tmp_path / f"third {i:04}.glb") is None
+    assert listings == [tmp_path]
+    # A suffix for each file, and a hundred names for each scene that has no other.
+    assert len(comparisons) <= 2 * count + 100 * count
+
+
+def test_a_folder_that_changed_is_listed_again(tmp_path):
+    (tmp_path / "room.glb").touch()
+    assert near_miss(tmp_path / "room.glb") is None
+    (tmp_path / "Room.vpltune.toml").touch()
+    # Folders keep the time of a change to some milliseconds.
+    os.utime(tmp_path, ns=(0, 0))
+    assert near_miss(tmp_path / "room.glb") == "Room.vpltune.toml"
 
 
 def test_what_is_written_reads_back(tmp_path):

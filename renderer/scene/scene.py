@@ -353,12 +353,7 @@ def look_at(
     right = np.cross(np.asarray(up, np.float64), backward)
     right /= np.linalg.norm(right)
     matrix = np.eye(4)
-    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3] = (
-        right,
-        np.cross(backward, right),
-        backward,
-        eye,
-    )
+    matrix[:3] = np.stack([right, np.cross(backward, right), backward, np.asarray(eye, np.float64)], axis=1)
     return matrix
 
 

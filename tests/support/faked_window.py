@@ -248,6 +248,8 @@ def opened_window(
     context.setdefault("viewport", {"width": 1200, "height": 800})
     with contextlib.closing(browser.new_context(**context)) as held:
         page = held.new_page()
+        # None of its own: a busy machine takes as long as it takes.
+        page.set_default_timeout(0)
         window = FakedWindow(page, scene or scene_message(), state or state_message())
         page.on("console", lambda message: window.problems.append(f"{message.type}: {message.text}"))
         page.on("pageerror", lambda error: window.problems.append(str(error)))
@@ -255,4 +257,6 @@ def opened_window(
         page.route_web_socket("ws://window.test/socket", window.connected)
         page.goto(ADDRESS)
         window.wait_for_rest()
+        # The look at rest may come before the first state.
+        page.wait_for_function("() => document.querySelector('input.number')?.value")
         yield window

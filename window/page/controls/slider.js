@@ -77,7 +77,8 @@ export class Slider {
 
   /** @param {number} value */
   #set(value) {
-    if (value === this.value) return;
+    // Before the first state there is no value to step from.
+    if (value === this.value || !Number.isFinite(value)) return;
     this.show(value, this.input.getAttribute("aria-valuetext") ?? "");
     this.use.set(value, this.gesture);
   }

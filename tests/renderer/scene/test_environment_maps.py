@@ -47,6 +47,7 @@ def test_a_header_that_says_too_much_is_refused(tmp_path, size, said):
         read_mitsuba(path)
 
 
+@pytest.mark.slow  # on a loaded machine, its processor time swells beyond the bound
 def test_a_large_environment_stays_within_the_bounds_of_reading(tmp_path):
     """The usual 8,192 × 4,096 texels, in half precision. They took 2 GiB."""
     pixels = np.zeros((4096, 8192, 3), np.float16)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import OpenEXR
-from jaxtyping import Float64
+from jaxtyping import Float32, Float64
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
 from vpltune.renderer.scene.files.image_texels import ImageDecoder
@@ -90,9 +90,11 @@ def _coarse_sky(
     azimuth = 2.0 * np.pi * (np.arange(columns) + 0.5) / columns
     polar = np.pi * (np.arange(rows) + 0.5) / rows
     solid_angle = 2.0 * np.pi / columns * np.pi / rows * np.sin(polar)
-    # Sums over the columns of a cell, then over its rows. Pixels stay as they are: there may be 67 million.
-    by_row = [np.add.reduceat(channel, first_column, axis=1, dtype=np.float64) for channel in pixels]
-    flux = np.add.reduceat(np.stack(by_row, axis=-1) * solid_angle[:, None, None], first_row, axis=0)
+    # Weighted sums over the rows of a cell as a product of matrices, since there may be 67 million pixels.
+    cell = np.repeat(np.arange(len(first_row)), np.diff([*first_row, rows]))
+    weights = np.where(cell == np.arange(len(first_row))[:, None], solid_angle, 0.0).astype(np.float32)
+    by_column = np.stack([weights @ channel for channel in pixels], axis=-1)
+    flux = np.add.reduceat(by_column, first_column, axis=1, dtype=np.float64)
     sine, cosine = np.add.reduceat(np.sin(polar), first_row), np.add.reduceat(np.cos(polar), first_row)
     # Mitsuba measures azimuth from −Z towards +X, and the polar angle from +Y.
     across = np.add.reduceat(np.sin(azimuth), first_column), np.add.reduceat(np.cos(azimuth), first_column)
@@ -112,7 +114,7 @@ def _cell_starts(count: int, cells: int) -> np.ndarray:
 
 
 def exr_channels(content: bytes, where: str) -> list[np.ndarray]:
-    """Red, green and blue of an OpenEXR image, each [height, width], in the type that the file has them in.
+    """Red, green and blue of an OpenEXR image, each [height, width], in single precision.
 
     Args:
         content: the file.
@@ -129,18 +131,26 @@ def exr_channels(content: bytes, where: str) -> list[np.ndarray]:
         try:
             _check_header(OpenEXR.File(str(copy), header_only=True), len(content), where)
             # As one array, the channels would take twice the memory.
-            channels = OpenEXR.File(str(copy), separate_channels=True).channels()
+            channels = OpenEXR.File(str(copy), separate_channels=True, num_threads=0).channels()
         except SceneFileError:
             raise
         except Exception as error:  # OpenEXR raises many types, none of its own
             raise SceneFileError(f"{where}: is not an OpenEXR image ({error})") from error
     if not all(name in channels for name in "RGB"):
         raise SceneFileError(f"{where}: must have channels R, G and B, got {', '.join(sorted(channels))}")
-    pixels = [channels[name].pixels for name in "RGB"]
+    pixels = [_single(channels[name].pixels) for name in "RGB"]
     # The least and the largest are no numbers if any pixel is none.
     if not all(channel.min() >= 0.0 and channel.max() < math.inf for channel in pixels):
         raise SceneFileError(f"{where}: radiance must be finite and ≥ 0")
     return pixels
+
+
+def _single(values: np.ndarray) -> Float32[np.ndarray, "height width"]:
+    """The values in single precision. Half precision goes by a table, five times as fast as numpy."""
+    if values.dtype != np.float16:
+        return values.astype(np.float32, copy=False)
+    table = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)
+    return table[values.view(np.uint16)]
 
 
 def _check_header(header_only: OpenEXR.File, encoded: int, where: str) -> None:

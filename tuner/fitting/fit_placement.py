@@ -54,7 +54,7 @@ def fit_placement(
     errors: Sequence[RobustError] | None = None,
     *,
     seed: int = 0,
-    visibility: Sequence[Bool[np.ndarray, "pixels vpls"]] | None = None,
+    visibility: Sequence[Bool[np.ndarray, "_ vpls"]] | None = None,
     turns: int = TURNS,
     progress: Callable[[float], None] | None = None,
     traced: Trace | None = None,

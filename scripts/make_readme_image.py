@@ -12,7 +12,8 @@ import numpy as np
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.image_file import write_png
 from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.scene import Camera, look_at
+from vpltune.renderer.scene.scene import Camera
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.evaluation.comparison_image import captioned, image_row
 from vpltune.tuner.evaluation.prepare_scene import SceneOptions, Stopwatch, prepare_scene

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from vpltune.renderer.frame.runtime import Runtime
     from vpltune.renderer.scene.array_scene import scene_from_arrays
     from vpltune.renderer.scene.files import read_scene
-    from vpltune.renderer.scene.scene import Camera, Light, Scene, look_at
+    from vpltune.renderer.scene.scene import Camera, Light, Scene
+    from vpltune.renderer.scene.transforms import look_at
     from vpltune.renderer.scene.trimesh_scene import scene_from_trimesh
     from vpltune.renderer.scene.views import View, read_views
     from vpltune.tuner import surrogate
@@ -75,7 +76,7 @@ _HOMES = {
     "View": "vpltune.renderer.scene.views",
     "Window": "vpltune.window.notebook",
     "fit": "vpltune.tuner.scene_fit.python_fit",
-    "look_at": "vpltune.renderer.scene.scene",
+    "look_at": "vpltune.renderer.scene.transforms",
     "read_config": "vpltune.renderer.config.tuned_config",
     "read_scene": "vpltune.renderer.scene.files",
     "read_views": "vpltune.renderer.scene.views",

@@ -19,7 +19,8 @@ from vpltune.renderer.files.video_file import clip_writer
 from vpltune.renderer.frame.capture import read_image
 from vpltune.renderer.frame.clip_state import ClipState
 from vpltune.renderer.frame.runtime import DrawnFrame, Runtime
-from vpltune.renderer.scene.scene import Camera, Light, Scene, look_at
+from vpltune.renderer.scene.scene import Camera, Light, Scene
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.prior.scene_generator import room_and_hall
 

@@ -20,7 +20,8 @@ from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import present_scenes
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
-from vpltune.renderer.scene.scene import Scene, transform_points
+from vpltune.renderer.scene.scene import Scene
+from vpltune.renderer.scene.transforms import transform_points
 from vpltune.tuner.evaluation.evaluate import surrogate_irradiance, traced_visibility
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene, SceneOptions, Stopwatch, prepare_scene
 from vpltune.tuner.metrics.view_metrics import relmse

@@ -18,7 +18,8 @@ from benchmarks.harness.scene_library import OUTSIDE_SCENES, scenes_folder
 from vpltune.renderer.config.tuned_config import read_config
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.scene import Camera, Light, look_at
+from vpltune.renderer.scene.scene import Camera, Light
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.evaluation.prepare_scene import MAX_SAMPLES, NOISE_TARGET
 from vpltune.tuner.metrics.view_metrics import energy_ratio, relmse

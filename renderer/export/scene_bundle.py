@@ -28,8 +28,9 @@ from vpltune.renderer.scene.animation import AnimationPlayer
 from vpltune.renderer.scene.light_faces import LightRecords, face_count, light_records
 from vpltune.renderer.scene.panes import is_pane
 from vpltune.renderer.scene.placed_boxes import placed_boxes
-from vpltune.renderer.scene.scene import Scene, Texture, transform_normals, transform_points
+from vpltune.renderer.scene.scene import Scene, Texture
 from vpltune.renderer.scene.sun_faces import SunGrid, nested_face_count
+from vpltune.renderer.scene.transforms import transform_normals, transform_points
 from vpltune.renderer.scene.views import View, light_to_json
 
 FORMAT = "vpltune-bundle"

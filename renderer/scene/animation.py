@@ -7,8 +7,9 @@ from jaxtyping import Float64, Int64
 
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE
-from vpltune.renderer.scene.scene import Camera, Light, Scene, trs_matrices, without_scale
+from vpltune.renderer.scene.scene import Camera, Light, Scene
 from vpltune.renderer.scene.scene_animation import Animation, Channel
+from vpltune.renderer.scene.transforms import trs_matrices, without_scale
 
 # Radians. Below this angle, slerp divides by a sine near zero, so it interpolates linearly instead. The chord
 # then differs from the arc by less than 1e-8.

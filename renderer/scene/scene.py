@@ -1,4 +1,4 @@
-"""A scene in plain arrays: meshes, materials, textures, lights and cameras.
+"""A scene in plain arrays: meshes, materials, textures, lights, cameras and what is around it.
 
 The runtime and the reference renderer share this description. Every surface is diffuse and two-sided;
 some have holes, or let a share of the light pass. Lengths are in world units.
@@ -13,12 +13,11 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float32, Float64, Int32, UInt8
 
+from vpltune.renderer.scene.environment import Environment
 from vpltune.renderer.scene.scene_animation import Animation, Skinning
 
 # A choice: points under all matrices that are bounded at a time. 32,768 × 3 doubles stay in a core's cache.
 _BOUND_CHUNK = 1 << 15
-# The axes after x, y and z, and the ones after these.
-_NEXT, _AFTER = [1, 2, 0], [2, 0, 1]
 
 Wrap = Literal["repeat", "mirrored_repeat", "clamp_to_edge"]
 AlphaMode = Literal["opaque", "mask", "blend"]
@@ -62,6 +61,12 @@ class Material:
     opacity: float = 1.0
     """In [0, 1]; `opaque` ignores it."""
     alpha_cutoff: float = 0.5
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Radiance that the surface emits in every direction, RGB in W/(m² sr), each ≥ 0."""
+    emission_texture: int | None = None
+    """Index into `Scene.textures` of a factor of the emission. Its opacity is ignored."""
+    emits_both_ways: bool = False
+    """Whether the back emits too. The front is where the triangles wind counter-clockwise."""
 
     @property
     def is_opaque(self) -> bool:
@@ -72,6 +77,11 @@ class Material:
     def is_blended(self) -> bool:
         """Whether the surface stops a share of the light."""
         return self.alpha_mode == "blend"
+
+    @property
+    def glows(self) -> bool:
+        """Whether the surface emits light of its own."""
+        return any(self.emission)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,6 +225,8 @@ class Scene:
     """One line for each kind of content in the file that is ignored or approximated."""
     animation: Animation | None = None
     """The motion, if any. All other fields describe the rest pose."""
+    environment: Environment | None = None
+    """Light from far away all around, if any."""
 
     def __repr__(self) -> str:
         counts = {
@@ -261,102 +273,6 @@ def _placed_bounds(
     return (low + matrices[:, :3, 3]).min(axis=0), (high + matrices[:, :3, 3]).max(axis=0)
 
 
-def transform_points(
-    matrix: Float64[np.ndarray, "4 4"], points: Float32[np.ndarray, "n 3"] | Float64[np.ndarray, "n 3"]
-) -> Float64[np.ndarray, "n 3"]:
-    """The points mapped by an affine matrix, in double precision."""
-    return points.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
-
-
-def cofactor_matrix(matrix: Float64[np.ndarray, "4 4"]) -> Float64[np.ndarray, "3 3"]:
-    """The matrix det(M)·M⁻ᵀ of an affine map M: it maps the cross product of two edges as M maps the edges.
-
-    It also exists for singular maps, and it keeps normals on the right side of mirrored surfaces.
-    """
-    linear = matrix[:3, :3]
-    first, second = linear[_NEXT], linear[_AFTER]
-    # Written out because np.cross takes ten times as long for three rows.
-    return first[:, _NEXT] * second[:, _AFTER] - first[:, _AFTER] * second[:, _NEXT]
-
-
-def transform_normals(
-    matrix: Float64[np.ndarray, "4 4"], normals: Float32[np.ndarray, "n 3"]
-) -> Float64[np.ndarray, "n 3"]:
-    """Unit normals transformed by the cofactor matrix of an affine map.
-
-    A normal that maps to zero, as on a node scaled flat, stays zero.
-    """
-    mapped = normals.astype(np.float64) @ cofactor_matrix(matrix).T
-    length = np.linalg.norm(mapped, axis=1, keepdims=True)
-    return np.divide(mapped, length, out=np.zeros_like(mapped), where=length > 0.0)
-
-
-def trs_matrices(
-    translation: Float64[np.ndarray, "n 3"],
-    rotation: Float64[np.ndarray, "n 4"],
-    scale: Float64[np.ndarray, "n 3"],
-) -> Float64[np.ndarray, "n 4 4"]:
-    """The matrices translation · rotation · scale. Quaternions are (x, y, z, w), of any non-zero length."""
-    x, y, z, w = (rotation / np.linalg.norm(rotation, axis=1, keepdims=True)).T
-    matrices = np.zeros((len(scale), 4, 4))
-    matrices[:, 0, :3] = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], axis=1)
-    matrices[:, 1, :3] = np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], axis=1)
-    matrices[:, 2, :3] = np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=1)
-    matrices[:, :3, :3] *= scale[:, None, :]
-    matrices[:, :3, 3] = translation
-    matrices[:, 3, 3] = 1.0
-    return matrices
-
-
-def without_scale(to_world: Float64[np.ndarray, "4 4"]) -> Float64[np.ndarray, "4 4"] | None:
-    """The rigid transform with the same position, −Z direction and plane of −Z and +Y.
-
-    Returns:
-        None if the matrix is so flat that −Z and +Y no longer span a plane.
-    """
-    depth = np.linalg.norm(to_world[:3, 2])
-    if not depth > 0.0:
-        return None
-    backward = to_world[:3, 2] / depth
-    right = np.cross(to_world[:3, 1], backward)
-    width = np.linalg.norm(right)
-    if not width > 0.0:
-        return None
-    rigid = np.eye(4)
-    rigid[:3, 0], rigid[:3, 2] = right / width, backward
-    rigid[:3, 1] = np.cross(backward, rigid[:3, 0])
-    rigid[:3, 3] = to_world[:3, 3]
-    return rigid
-
-
-def look_at(
-    eye: Numbers,
-    target: Numbers,
-    up: Numbers | None = None,
-) -> Float64[np.ndarray, "4 4"]:
-    """Camera-to-world matrix of a camera at `eye` that looks at `target` along its −Z axis, with +Y up.
-
-    Each is three numbers, in world units. `up` defaults to world +Y, or to world −Z if the view direction is
-    within 2.5 degrees of vertical.
-
-    Raises:
-        ValueError: `eye` and `target` coincide.
-    """
-    eye = np.asarray(eye, np.float64)
-    backward = eye - np.asarray(target, np.float64)
-    distance = np.linalg.norm(backward)
-    if not distance > 0.0:
-        raise ValueError(f"look_at: eye and target must differ, got {eye.tolist()} twice")
-    backward = backward / distance
-    if up is None:
-        up = (0.0, 1.0, 0.0) if abs(backward[1]) < 0.999 else (0.0, 0.0, -1.0)
-    right = np.cross(np.asarray(up, np.float64), backward)
-    right /= np.linalg.norm(right)
-    matrix = np.eye(4)
-    matrix[:3] = np.stack([right, np.cross(backward, right), backward, np.asarray(eye, np.float64)], axis=1)
-    return matrix
-
-
 def scaled(scene: Scene, factor: float) -> Scene:
     """The scene scaled by `factor`, lights and cameras included.
 
@@ -375,6 +291,7 @@ def scaled(scene: Scene, factor: float) -> Scene:
         animation=None
         if scene.animation is None
         else replace(scene.animation, root_to_world=grow @ scene.animation.root_to_world),
+        environment=scene.environment,
     )
 
 

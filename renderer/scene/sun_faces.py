@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
-from vpltune.renderer.scene.scene import Instance, Scene, transform_points
+from vpltune.renderer.scene.scene import Instance, Scene
+from vpltune.renderer.scene.transforms import transform_points
 
 SIZE_STEP = 2.0**0.125
 """A choice: ratio of consecutive sizes of a snapped face. It costs at most 1/12 of the texels per axis."""

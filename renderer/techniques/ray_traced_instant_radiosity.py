@@ -12,8 +12,9 @@ from vpltune.renderer.frame.frame import Frame
 from vpltune.renderer.frame.frame_pass import FrameInputs
 from vpltune.renderer.frame.point_table import r2_sequence
 from vpltune.renderer.gpu.resources import Resources
-from vpltune.renderer.scene.scene import Light, Scene, transform_points
+from vpltune.renderer.scene.scene import Light, Scene
 from vpltune.renderer.scene.spot_cone import cone_scale
+from vpltune.renderer.scene.transforms import transform_points
 from vpltune.renderer.scene.views import View
 from vpltune.renderer.techniques.gathered_vpls import VPL_DTYPE, GatheredVpls
 

@@ -14,7 +14,8 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.placement import resolve_camera_and_lights
-from vpltune.renderer.scene.scene import Camera, Light, look_at
+from vpltune.renderer.scene.scene import Camera, Light
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.surrogate.receiver_chunks import receivers_at_once
 from vpltune.tuner.surrogate.tabulated_gather import gather_tabulated, tabulate_gather

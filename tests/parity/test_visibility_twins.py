@@ -17,7 +17,8 @@ from vpltune.renderer.frame.capture import CapturedFrame
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.placement import resolve_camera_and_lights
-from vpltune.renderer.scene.scene import Camera, Light, look_at, scaled
+from vpltune.renderer.scene.scene import Camera, Light, scaled
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View, scaled_view
 from vpltune.tuner.surrogate.virtual_point_lights import gather_inputs
 from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, gather

@@ -16,7 +16,8 @@ from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.clip_state import ClipState
 from vpltune.renderer.frame.runtime import Runtime
-from vpltune.renderer.scene.scene import Camera, Light, look_at, scaled
+from vpltune.renderer.scene.scene import Camera, Light, scaled
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View, scaled_view
 from vpltune.tuner.fitting.fit_density import DISC_FOOTPRINT
 

@@ -13,8 +13,8 @@ from vpltune.renderer.frame.clip_state import ClipState
 from vpltune.renderer.frame.passes.vpl_importance import LARGEST_LAG
 from vpltune.renderer.frame.runtime import DrawnFrame, Runtime
 from vpltune.renderer.scene.light_faces import light_records
-from vpltune.renderer.scene.scene import look_at
 from vpltune.renderer.scene.sun_faces import SunGrid
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 
 SIZE = (32, 24)

@@ -29,8 +29,9 @@ from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.light_faces import light_records
 from vpltune.renderer.scene.placement import resolve_camera_and_lights
-from vpltune.renderer.scene.scene import Camera, Light, look_at
+from vpltune.renderer.scene.scene import Camera, Light
 from vpltune.renderer.scene.sun_faces import SunGrid
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.metrics.view_metrics import energy_ratio, relmse
 

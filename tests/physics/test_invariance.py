@@ -13,8 +13,9 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.animation import Pose
 from vpltune.renderer.scene.dynamic_lights import DynamicLights, point_lights, scaled_records
-from vpltune.renderer.scene.scene import Camera, look_at, scaled
+from vpltune.renderer.scene.scene import Camera, scaled
 from vpltune.renderer.scene.sequence import Sequence
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View, scaled_view
 
 ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.15, 0.45))

@@ -18,7 +18,8 @@ from vpltune.renderer.frame.rsm_resolution import (
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.gpu.render_targets import atlas_columns
 from vpltune.renderer.scene.light_faces import face_count
-from vpltune.renderer.scene.scene import Camera, look_at
+from vpltune.renderer.scene.scene import Camera
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 
 

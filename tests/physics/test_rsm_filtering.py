@@ -11,7 +11,8 @@ from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
-from vpltune.renderer.scene.scene import Camera, Light, Material, Texture, look_at
+from vpltune.renderer.scene.scene import Camera, Light, Material, Texture
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 
 

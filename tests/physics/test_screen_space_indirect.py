@@ -13,7 +13,8 @@ from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.dynamic_lights import DynamicLights, point_lights
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.placement import resolve_camera_and_lights
-from vpltune.renderer.scene.scene import Camera, Light, look_at, scaled
+from vpltune.renderer.scene.scene import Camera, Light, scaled
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View, scaled_view
 from vpltune.renderer.techniques.gather_full_rsm import GatherFullRsm
 from vpltune.tuner.metrics.view_metrics import energy_ratio

@@ -8,7 +8,8 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
-from vpltune.renderer.scene.scene import Camera, Light, Mesh, look_at
+from vpltune.renderer.scene.scene import Camera, Light, Mesh
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.surrogate.virtual_point_lights import gather_inputs
 from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, gather

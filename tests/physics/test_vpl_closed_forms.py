@@ -9,7 +9,8 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import CapturedFrame
 from vpltune.renderer.frame.runtime import Runtime
-from vpltune.renderer.scene.scene import Camera, Light, look_at
+from vpltune.renderer.scene.scene import Camera, Light
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 
 

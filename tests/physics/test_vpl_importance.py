@@ -9,7 +9,8 @@ from point_vpls import point_vpls
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
-from vpltune.renderer.scene.scene import Camera, look_at, scaled
+from vpltune.renderer.scene.scene import Camera, scaled
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View, scaled_view
 
 

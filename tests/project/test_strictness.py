@@ -6,7 +6,7 @@ import jaxtyping
 import numpy as np
 import pytest
 
-from vpltune.renderer.scene.scene import transform_points
+from vpltune.renderer.scene.transforms import transform_points
 
 
 def test_floating_point_errors_raise():

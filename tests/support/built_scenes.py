@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from vpltune.renderer.scene.scene import Camera, Instance, Light, Material, Mesh, Scene, look_at
+from vpltune.renderer.scene.scene import Camera, Instance, Light, Material, Mesh, Scene
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 from built_scenes import quad
 
-from vpltune.renderer.scene.scene import AlphaMode, Camera, Instance, Light, Material, Scene, Texture, look_at
+from vpltune.renderer.scene.scene import AlphaMode, Camera, Instance, Light, Material, Scene, Texture
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 
 SUN = Light("directional", np.full(3, 3.0), direction_world=np.array([0.0, -1.0, 0.0]))

@@ -11,7 +11,8 @@ from vpltune.renderer.gpu.gpu_program import ComputeProgram
 from vpltune.renderer.gpu.ray_hierarchy import RAY_DEFINES, RAY_READS, RayHierarchy
 from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
-from vpltune.renderer.scene.scene import Scene, transform_points
+from vpltune.renderer.scene.scene import Scene
+from vpltune.renderer.scene.transforms import transform_points
 
 _SHADER = """
 layout(local_size_x = 64) in;

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float64
 
-from vpltune.renderer.scene.scene import Camera, Instance, Light, Material, Mesh, Scene, look_at, scaled
+from vpltune.renderer.scene.scene import Camera, Instance, Light, Material, Mesh, Scene, scaled
+from vpltune.renderer.scene.transforms import look_at
 
 Corner = np.ndarray | list[float]
 

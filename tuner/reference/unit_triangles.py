@@ -10,7 +10,8 @@ import numpy as np
 from jaxtyping import Float, Float32, Float64, Int64, UInt32
 
 from vpltune.renderer.errors import InputError
-from vpltune.renderer.scene.scene import Light, Mesh, Scene, transform_normals, transform_points
+from vpltune.renderer.scene.scene import Light, Mesh, Scene
+from vpltune.renderer.scene.transforms import transform_normals, transform_points
 
 WRAP_MODES = ("repeat", "mirrored_repeat", "clamp_to_edge")
 """A wrap mode is stored as its index in this tuple."""

@@ -8,8 +8,9 @@ from jaxtyping import Float64
 from vpltune.cli.options import parse_numbers
 from vpltune.cli.view_options import ViewFlags
 from vpltune.renderer.errors import InputError
-from vpltune.renderer.scene.scene import Camera, Light, look_at
+from vpltune.renderer.scene.scene import Camera, Light
 from vpltune.renderer.scene.spot_cone import checked_cone
+from vpltune.renderer.scene.transforms import look_at
 
 DEFAULT_YFOV_DEGREES = 50.0
 """Vertical field of view. A choice."""

@@ -15,8 +15,8 @@ from vpltune.renderer.scene.files.gltf_document import GltfDocument
 from vpltune.renderer.scene.files.gltf_nodes import GltfNodes
 from vpltune.renderer.scene.files.json_object import JsonObject
 from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, MAX_CHANNELS
-from vpltune.renderer.scene.scene import trs_matrices
 from vpltune.renderer.scene.scene_animation import AnimatedProperty, Animation, Channel, Interpolation, Skin
+from vpltune.renderer.scene.transforms import trs_matrices
 
 # Animated properties and the accessor type of their values, then interpolations (glTF 2.0 section 3.11).
 _PROPERTIES: dict[AnimatedProperty, str] = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}

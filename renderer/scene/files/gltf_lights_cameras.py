@@ -9,8 +9,9 @@ from vpltune.renderer.scene.files.diagnostics import SceneFileError, label
 from vpltune.renderer.scene.files.gltf_document import GltfDocument
 from vpltune.renderer.scene.files.json_object import JsonObject
 from vpltune.renderer.scene.files.limits import LARGEST_NUMBER, LARGEST_RADIOMETRIC
-from vpltune.renderer.scene.scene import Camera, Light, without_scale
+from vpltune.renderer.scene.scene import Camera, Light
 from vpltune.renderer.scene.spot_cone import checked_cone
+from vpltune.renderer.scene.transforms import without_scale
 
 
 def read_camera(

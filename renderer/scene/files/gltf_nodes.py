@@ -7,7 +7,7 @@ from vpltune.renderer.scene.files.diagnostics import SceneFileError
 from vpltune.renderer.scene.files.gltf_document import GltfDocument
 from vpltune.renderer.scene.files.json_object import JsonObject
 from vpltune.renderer.scene.files.limits import LARGEST_COORDINATE, MAX_NODES
-from vpltune.renderer.scene.scene import trs_matrices
+from vpltune.renderer.scene.transforms import trs_matrices
 
 
 class GltfNodes:

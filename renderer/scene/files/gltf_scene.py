@@ -19,7 +19,8 @@ from vpltune.renderer.scene.files.gltf_primitives import GltfPrimitives
 from vpltune.renderer.scene.files.json_object import JsonObject, JsonObjects
 from vpltune.renderer.scene.files.limited_decoder import LimitedDecoder
 from vpltune.renderer.scene.files.limits import MAX_CAMERAS, MAX_INSTANCES, MAX_LIGHTS
-from vpltune.renderer.scene.scene import Camera, Instance, Light, Mesh, Scene, trs_matrices
+from vpltune.renderer.scene.scene import Camera, Instance, Light, Mesh, Scene
+from vpltune.renderer.scene.transforms import trs_matrices
 
 
 def read_gltf(path: Path, warnings: Warnings) -> Scene:

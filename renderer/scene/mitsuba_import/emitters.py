@@ -18,8 +18,9 @@ from vpltune.renderer.scene.mitsuba_import.environment_map import environment_li
 from vpltune.renderer.scene.mitsuba_import.materials import MaterialReader, texture_name
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
 from vpltune.renderer.scene.mitsuba_import.values import unit_direction
-from vpltune.renderer.scene.scene import Light, Mesh, cofactor_matrix
+from vpltune.renderer.scene.scene import Light, Mesh
 from vpltune.renderer.scene.spot_cone import checked_cone
+from vpltune.renderer.scene.transforms import cofactor_matrix
 
 # A choice: an emitter faces one direction if the vector sum of its triangles' areas is at least this share
 # of its area.

@@ -25,7 +25,8 @@ from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin, plugin_tre
 from vpltune.renderer.scene.mitsuba_import.searched_folder import SearchedFolder
 from vpltune.renderer.scene.mitsuba_import.shapes import ShapeReader
 from vpltune.renderer.scene.mitsuba_import.xml_tree import parse_xml
-from vpltune.renderer.scene.scene import Camera, Instance, Light, Mesh, Scene, without_scale
+from vpltune.renderer.scene.scene import Camera, Instance, Light, Mesh, Scene
+from vpltune.renderer.scene.transforms import without_scale
 
 # Top-level plugins that do not affect the imported scene, or only through others: no warning for these.
 _SILENT = ("integrator", "sampler", "film", "rfilter", "bsdf", "texture")

@@ -26,7 +26,8 @@ from vpltune.renderer.scene.placement.free_places import (
 from vpltune.renderer.scene.placement.free_space import FreeSpace, sphere_directions
 from vpltune.renderer.scene.placement.sight import front_facing, lit_fraction, seen_by
 from vpltune.renderer.scene.placement.subject import detail_bounds, subject_pieces, subject_space
-from vpltune.renderer.scene.scene import Camera, Light, Scene, look_at
+from vpltune.renderer.scene.scene import Camera, Light, Scene
+from vpltune.renderer.scene.transforms import look_at
 
 # A choice: vertical field of view inside a room, radians.
 YFOV = math.radians(62.0)

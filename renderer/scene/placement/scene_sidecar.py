@@ -33,8 +33,9 @@ from vpltune.renderer.scene.placement.automatic_light import default_light
 from vpltune.renderer.scene.placement.sidecar_file import near_miss, sidecar_path
 from vpltune.renderer.scene.placement.sight import lit_fraction, seen_by
 from vpltune.renderer.scene.placement.subject import space_of_view
-from vpltune.renderer.scene.scene import Camera, Light, LightKind, Scene, look_at
+from vpltune.renderer.scene.scene import Camera, Light, LightKind, Scene
 from vpltune.renderer.scene.spot_cone import checked_cone
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.working_scale import require_drawable
 
 # A choice: vertical field of view if a camera gives none.

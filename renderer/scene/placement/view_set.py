@@ -17,7 +17,8 @@ from vpltune.renderer.scene.placement.sight import (
     seen_by,
 )
 from vpltune.renderer.scene.placement.subject import space_of_view
-from vpltune.renderer.scene.scene import Camera, Light, Scene, look_at
+from vpltune.renderer.scene.scene import Camera, Light, Scene
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import Split, View
 
 # Choices: a camera moves by up to this share of the median depth it sees, a light by up to this share of the

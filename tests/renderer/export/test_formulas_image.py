@@ -25,7 +25,8 @@ from examples.formulas.vpl_importance import importance_cells, importance_factor
 from vpltune import Runtime, TunedConfig, View
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
-from vpltune.renderer.scene.scene import Camera, look_at
+from vpltune.renderer.scene.scene import Camera
+from vpltune.renderer.scene.transforms import look_at
 
 RESOLUTION = 64
 LIGHT = VECTORS["rsm"]["light"]

@@ -9,8 +9,9 @@ from built_scenes import colored_room, quad
 
 from vpltune.renderer.export.glb_writer import write_glb
 from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.scene import Camera, Instance, Light, Material, Scene, Texture, look_at
+from vpltune.renderer.scene.scene import Camera, Instance, Light, Material, Scene, Texture
 from vpltune.renderer.scene.scene_animation import Animation
+from vpltune.renderer.scene.transforms import look_at
 
 
 def _rich_scene() -> Scene:

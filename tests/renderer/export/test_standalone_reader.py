@@ -17,7 +17,7 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, parse_config
 from vpltune.renderer.export.scene_bundle import left_out, scene_bundle, write_bundle
-from vpltune.renderer.scene.scene import look_at
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.tuner.fitting.fit_density import DISC_FOOTPRINT
 
 # Importing one of ours would fail.

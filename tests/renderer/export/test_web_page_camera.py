@@ -9,7 +9,8 @@ from built_scenes import quad, room_view, scene_of
 from exported_frames import CONFIG, with_parameters, with_resolution
 from exported_page import page_text
 
-from vpltune.renderer.scene.scene import Camera, look_at
+from vpltune.renderer.scene.scene import Camera
+from vpltune.renderer.scene.transforms import look_at
 
 SMALL = with_resolution(with_parameters(CONFIG, vpl_count=8), 64)
 GRAY = [(0.6, 0.6, 0.6)]

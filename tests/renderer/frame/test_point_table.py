@@ -10,7 +10,8 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.point_table import POISSON_RADIUS, point_table, poisson_disc, r2_sequence
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
-from vpltune.renderer.scene.scene import Camera, Light, look_at
+from vpltune.renderer.scene.scene import Camera, Light
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 
 

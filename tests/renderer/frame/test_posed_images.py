@@ -12,7 +12,8 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.animation import AnimationPlayer
 from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.scene import Camera, Instance, Mesh, look_at
+from vpltune.renderer.scene.scene import Camera, Instance, Mesh
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 
 # Visibility maps see a skin as rigid pieces, see renderer/gpu/ray_hierarchy.py.

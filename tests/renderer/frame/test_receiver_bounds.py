@@ -12,7 +12,8 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.passes import receiver_bounds
 from vpltune.renderer.frame.runtime import DrawnFrame, Runtime
 from vpltune.renderer.frame.visibility_map_layout import FEW_LOOKED_UP
-from vpltune.renderer.scene.scene import Camera, Light, Scene, look_at
+from vpltune.renderer.scene.scene import Camera, Light, Scene
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.prior.scene_generator import generated_scene
 

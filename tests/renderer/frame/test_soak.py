@@ -16,8 +16,9 @@ from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
 from vpltune.renderer.scene.dynamic_lights import DynamicLights
 from vpltune.renderer.scene.light_motion import BouncingLights
-from vpltune.renderer.scene.scene import Camera, look_at
+from vpltune.renderer.scene.scene import Camera
 from vpltune.renderer.scene.sequence import Sequence
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 
 FPS = 60.0

@@ -9,7 +9,8 @@ from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.srgb import linear_from_srgb
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.array_scene import scene_from_arrays
-from vpltune.renderer.scene.scene import Camera, Light, Material, Scene, look_at
+from vpltune.renderer.scene.scene import Camera, Light, Material, Scene
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 
 SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])

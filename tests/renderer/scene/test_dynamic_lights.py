@@ -28,7 +28,8 @@ from vpltune.renderer.scene.dynamic_lights import (
     scaled_records,
     spot_lights,
 )
-from vpltune.renderer.scene.scene import Camera, look_at, scaled
+from vpltune.renderer.scene.scene import Camera, scaled
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View, scaled_view
 from vpltune.renderer.techniques.light_per_draw import LightPerDrawPass
 

@@ -13,7 +13,8 @@ from reading_cost import MITSUBA, check_cost
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.files.limits import MAX_INSTANCES, MAX_PLACED_VERTICES
 from vpltune.renderer.scene.mitsuba_import import read_mitsuba
-from vpltune.renderer.scene.scene import Instance, Mesh, Scene, transform_points
+from vpltune.renderer.scene.scene import Instance, Mesh, Scene
+from vpltune.renderer.scene.transforms import transform_points
 
 CUBE = '<shape type="cube"/>'
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"

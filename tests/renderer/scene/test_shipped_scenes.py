@@ -9,7 +9,7 @@ import pytest
 from scene_paths import OWN_SCENES
 
 from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.scene import transform_points
+from vpltune.renderer.scene.transforms import transform_points
 
 SCRIPT = OWN_SCENES[0].parent / "make_scenes.py"
 # Name, longest edge of the bounds in metres, kind of light.

@@ -10,7 +10,8 @@ from scene_paths import OWN_SCENES
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.srgb import linear_from_srgb
 from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.scene import Camera, Light, Scene, look_at, transform_points
+from vpltune.renderer.scene.scene import Camera, Light, Scene
+from vpltune.renderer.scene.transforms import look_at, transform_points
 from vpltune.renderer.scene.trimesh_scene import scene_from_trimesh
 
 SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])

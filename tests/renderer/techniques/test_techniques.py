@@ -10,7 +10,8 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import read_image
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.gpu.resources import Resources
-from vpltune.renderer.scene.scene import Camera, Light, Scene, Texture, look_at
+from vpltune.renderer.scene.scene import Camera, Light, Scene, Texture
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 from vpltune.renderer.techniques.gather_full_rsm import GatherFullRsm
 from vpltune.renderer.techniques.ray_traced_instant_radiosity import RayTracedInstantRadiosity, traced_vpls

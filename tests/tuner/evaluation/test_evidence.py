@@ -11,7 +11,8 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
-from vpltune.renderer.scene.scene import Camera, look_at
+from vpltune.renderer.scene.scene import Camera
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.tuner.evaluation.evidence import doubts, undetermined
 from vpltune.tuner.fitting.uncertainty import Interval
 from vpltune.tuner.surrogate.captured_view import CapturedView

@@ -10,7 +10,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from vpltune.renderer.scene.scene import Camera, Instance, Light, Material, Mesh, Scene, Texture, look_at
+from vpltune.renderer.scene.scene import Camera, Instance, Light, Material, Mesh, Scene, Texture
+from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View, ray_directions_world
 
 

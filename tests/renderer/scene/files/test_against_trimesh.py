@@ -6,7 +6,8 @@ import trimesh
 from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
 from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.scene import Scene, transform_points
+from vpltune.renderer.scene.scene import Scene
+from vpltune.renderer.scene.transforms import transform_points
 
 # OBJ is skipped: trimesh splits concave faces as fans, which changes their area.
 GLTF_SCENES = [name for name, file in OUTSIDE_SCENES.items() if not file.endswith(".obj")]

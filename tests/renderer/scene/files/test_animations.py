@@ -8,7 +8,8 @@ import pytest
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.animation import AnimationPlayer
 from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.scene import scaled, transform_points
+from vpltune.renderer.scene.scene import scaled
+from vpltune.renderer.scene.transforms import transform_points
 
 QUARTER_TURN_ABOUT_Z = [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
 

@@ -5,7 +5,7 @@ import pytest
 
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.scene import transform_normals, transform_points
+from vpltune.renderer.scene.transforms import transform_normals, transform_points
 
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
 HALF = np.sqrt(0.5)

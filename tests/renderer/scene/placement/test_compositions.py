@@ -16,7 +16,8 @@ from vpltune.renderer.scene.placement.free_space import free_space
 from vpltune.renderer.scene.placement.rasterised_surfaces import placed_triangles, triangles_in_box
 from vpltune.renderer.scene.placement.sight import lit_fraction, seen_by
 from vpltune.renderer.scene.placement.subject import space_of_view, subject_space
-from vpltune.renderer.scene.scene import Camera, Light, look_at
+from vpltune.renderer.scene.scene import Camera, Light
+from vpltune.renderer.scene.transforms import look_at
 
 HARD = hard_scenes()
 SUBJECT = np.array([310.0, 0.5, -420.0])

@@ -12,7 +12,8 @@ from vpltune.renderer.scene.placement import default_camera, default_light, rast
 from vpltune.renderer.scene.placement.free_places import is_room
 from vpltune.renderer.scene.placement.free_space import free_space, march_rays, marched, sphere_directions
 from vpltune.renderer.scene.placement.sight import cone_directions, light_hits, lit, lit_fraction, seen_by
-from vpltune.renderer.scene.scene import Camera, Light, look_at, scaled, scaled_camera, scaled_light
+from vpltune.renderer.scene.scene import Camera, Light, scaled, scaled_camera, scaled_light
+from vpltune.renderer.scene.transforms import look_at
 
 
 def box_mesh(low, high, material=0):

@@ -68,8 +68,8 @@ def pass_operations(drawn: DrawnFrame, config: TunedConfig, triangles: int) -> d
         pair += LOOKUP_OPERATIONS
     ray = BOX_OPERATIONS * math.log2(max(2, triangles)) + TRIANGLE_OPERATIONS
     operations = {
-        "vpl_gather": pixels * setup.vpl_count / setup.interleave**2 * pair,
-        "vpl_visibility_maps": float(setup.vpl_count * setup.maps.size**2) * ray,
+        "vpl_gather": pixels * setup.pools.total / setup.interleave**2 * pair,
+        "vpl_visibility_maps": float(setup.pools.total * setup.maps.size**2) * ray,
     }
     lights = drawn.inputs.dynamic_lights
     if lights is not None:

@@ -19,6 +19,8 @@ from vpltune.renderer.frame.frame_pass import FrameInputs
 from vpltune.renderer.frame.frame_timing import PassClock, frame_milliseconds
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
 from vpltune.renderer.frame.visibility_map_layout import NO_MAPS
+from vpltune.renderer.frame.vpl_pools import VplPools
+from vpltune.renderer.gpu.glowing_triangles import GlowingTriangles
 from vpltune.renderer.gpu.gpu_context import check_errors, create_context, free_dropped
 from vpltune.renderer.gpu.ray_hierarchy import RayHierarchy
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
@@ -105,7 +107,7 @@ class DrawnFrame:
 
 
 class Runtime:
-    """Draws a scene with direct light and one bounce of VPL light, on the GPU alone.
+    """Draws a scene with direct light, and light reflected once or more from VPLs, on the GPU alone.
 
     Drawing is a function of view, config and state: two calls with the same arguments give the same image,
     whatever was drawn between them. Only `pose` changes the scene.
@@ -132,6 +134,7 @@ class Runtime:
         self._scale = working_scale(scene)
         self._scene = scene = scaled(scene, self._scale) if self._scale != 1.0 else scene
         self.scene_buffers = SceneBuffers(self._context, scene)
+        self._glowing = GlowingTriangles(self._context, scene, self.scene_buffers)
         self._hierarchy: RayHierarchy | None = None
         self._nested_faces = nested_face_count(scene)
         self._frames: OrderedDict[FrameSetup, Frame] = OrderedDict()
@@ -288,9 +291,7 @@ class Runtime:
         Raises:
             ValueError: there are no configs, they draw VPLs differently, or one has a prior.
         """
-        drawn_as = {
-            (placement(each.parameters), FrameSetup.of(view, each, self._nested_faces)) for each in configs
-        }
+        drawn_as = {(placement(each.parameters), self._setup(view, each)) for each in configs}
         if len(drawn_as) != 1:
             raise ValueError("capture_variants: configs must be one or more with one placement of the VPLs")
         if any(each.auto is not None for each in configs):
@@ -327,7 +328,7 @@ class Runtime:
 
     def _tone_mapped(self, radiance: np.ndarray, exposure: float | None) -> Frame:
         height, width = radiance.shape[:2]
-        frame = self._frame(FrameSetup((width, height), 1, 1, 1, 1, 1, NO_MAPS, None, 0.0))
+        frame = self._frame(FrameSetup((width, height), 1, 1, 1, VplPools(1), 1, 1, NO_MAPS, None, 0.0))
         pixels = np.ones((height, width, 4), np.float32)
         pixels[..., : radiance.shape[2]] = radiance
         frame.texture("radiance").write(np.ascontiguousarray(pixels[::-1]).tobytes())
@@ -343,7 +344,7 @@ class Runtime:
         table_rotation: tuple[float, float] = (0.0, 0.0),
         lights: DynamicLights | None = None,
     ) -> DrawnFrame:
-        frame = self._frame(FrameSetup.of(view, config, self._nested_faces))
+        frame = self._frame(self._setup(view, config))
         inputs = self._inputs(view, config, state, table_rotation=table_rotation, lights=lights)
         frame.draw(inputs)
         return DrawnFrame(frame, inputs, self._scaled(view), config, self._scale)
@@ -360,7 +361,7 @@ class Runtime:
         table_rotation: tuple[float, float] = (0.0, 0.0),
         lights: DynamicLights | None = None,
     ) -> FrameInputs:
-        frame = self._frame(FrameSetup.of(view, config, self._nested_faces))
+        frame = self._frame(self._setup(view, config))
         view = self._scaled(view)
         if lights is not None and self._scale != 1.0:
             lights = DynamicLights(scaled_records(lights.records, self._scale))
@@ -393,8 +394,13 @@ class Runtime:
         while len(self._frames) >= KEPT_FRAMES:
             self._frames.popitem(last=False)
         free_dropped(self._context)
-        if setup.maps.size and self._hierarchy is None:
+        casts_rays = setup.maps.size > 0 or setup.pools.later > 0
+        if casts_rays and self._hierarchy is None:
             self._hierarchy = RayHierarchy(self._context, self._scene, self.scene_buffers)
-        hierarchy = self._hierarchy if setup.maps.size else None
-        frame = self._frames[setup] = Frame(self.scene_buffers, setup, self.options, hierarchy)
+        hierarchy = self._hierarchy if casts_rays else None
+        glowing = self._glowing if setup.pools.glowing else None
+        frame = self._frames[setup] = Frame(self.scene_buffers, setup, self.options, hierarchy, glowing)
         return frame
+
+    def _setup(self, view: View, config: TunedConfig) -> FrameSetup:
+        return FrameSetup.of(view, config, self._nested_faces, glows=self._glowing.count > 0)

@@ -89,7 +89,7 @@ def _settings(options: JobOptions) -> str:
     start = parse_config(options.start, "the start of the fit")
     settings = asdict(options) | {"start": start.parameters.as_dict(), "visibility": start.visibility}
     settings["quality"] = start.quality.as_dict()
-    settings["light"] = dict(start.light)
+    settings["light"] = start.light.as_dict()
     if start.auto is not None:
         settings["auto"] = start.auto.as_dict()
     versions = {name: importlib.metadata.version(name) for name in ("vpltune", "jax", "mitsuba")}

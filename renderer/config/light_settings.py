@@ -1,7 +1,7 @@
 """The light part of a config: which of a scene's light is drawn."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from vpltune.renderer.errors import InputError
@@ -9,6 +9,8 @@ from vpltune.renderer.errors import InputError
 MOST_BOUNCES = 64
 """Reflections that can be asked for. A choice: the reference's longest path (`BOUNCE_LIMIT` of
 tuner/reference/indirect_irradiance.py)."""
+MOST_SKY_LIGHTS = 256
+"""Lights that a sky may become. A choice: each draws the scene once."""
 
 Bounces = int | Literal["all"]
 
@@ -24,6 +26,9 @@ class LightSettings:
     bounces: Bounces = 1
     """Reflections, at most, before light reaches the surface that the camera sees: 1 to 64, or "all"."""
 
+    sky_lights: int = 32
+    """Directional lights, each with a shadow map, that stand for the scene's sky or environment: 1 to 256."""
+
     def __post_init__(self) -> None:
         self.check("light")
 
@@ -35,6 +40,11 @@ class LightSettings:
                 f'{where}.bounces: must be "all" or a whole number from 1 to {MOST_BOUNCES}, '
                 f"got {self.bounces!r:.60}"
             )
+        count = self.sky_lights
+        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_SKY_LIGHTS:
+            raise InputError(
+                f"{where}.sky_lights: must be a whole number from 1 to {MOST_SKY_LIGHTS}, got {count!r:.60}"
+            )
 
     @property
     def most_bounces(self) -> int | None:
@@ -43,7 +53,7 @@ class LightSettings:
 
     def as_dict(self) -> dict[str, Any]:
         """The part as the file holds it."""
-        return {"bounces": self.bounces}
+        return asdict(self)
 
     @classmethod
     def validated(cls, values: Any, where: str) -> "LightSettings":
@@ -54,17 +64,19 @@ class LightSettings:
         """
         if not isinstance(values, Mapping):
             raise InputError(f"{where}: must be an object, got {type(values).__name__}")
+        known = cls.__dataclass_fields__
         for key in values:
-            if key != "bounces":
-                raise InputError(f"{where}: unknown key {key!r:.60}; known is bounces")
-        bounces: Any = values.get("bounces", cls.bounces)
-        if isinstance(bounces, float) and bounces.is_integer():
-            bounces = int(bounces)
+            if key not in known:
+                raise InputError(f"{where}: unknown key {key!r:.60}; known are {', '.join(known)}")
         # Checked before the object exists, so that the error names the file.
         unchecked = object.__new__(cls)
-        object.__setattr__(unchecked, "bounces", bounces)
+        for name, spec in known.items():
+            value: Any = values.get(name, spec.default)
+            # Some programs write 3 as 3.0.
+            whole = isinstance(value, float) and value.is_integer()
+            object.__setattr__(unchecked, name, int(value) if whole else value)
         unchecked.check(where)
-        return cls(bounces)
+        return cls(unchecked.bounces, unchecked.sky_lights)
 
 
 def light_schema() -> dict[str, Any]:
@@ -78,6 +90,13 @@ def light_schema() -> dict[str, Any]:
                 "description": "Reflections, at most, before light reaches what the camera sees.",
                 "anyOf": [{"const": "all"}, {"type": "integer", "minimum": 1, "maximum": MOST_BOUNCES}],
                 "default": LightSettings().bounces,
-            }
+            },
+            "sky_lights": {
+                "description": "Directional lights that stand for the scene's sky or environment.",
+                "type": "integer",
+                "minimum": 1,
+                "maximum": MOST_SKY_LIGHTS,
+                "default": LightSettings().sky_lights,
+            },
         },
     }

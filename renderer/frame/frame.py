@@ -65,6 +65,7 @@ from vpltune.renderer.scene.light_faces import (
     face_count,
     light_records,
 )
+from vpltune.renderer.scene.scene import Light
 from vpltune.renderer.scene.sun_faces import SunGrid
 from vpltune.renderer.scene.views import View
 
@@ -87,7 +88,9 @@ class FrameSetup:
     adaptation_frames: float
 
     @classmethod
-    def of(cls, view: View, config: TunedConfig, nested_faces: int, *, glows: bool) -> "FrameSetup":
+    def of(
+        cls, view: View, config: TunedConfig, nested_faces: int, *, glows: bool, sky_lights: int = 0
+    ) -> "FrameSetup":
         """The set-up that draws `view` with `config`.
 
         Args:
@@ -95,14 +98,16 @@ class FrameSetup:
             config: gives all else.
             nested_faces: of each sun in the scene.
             glows: whether a surface of the scene glows.
+            sky_lights: lights that stand for the scene's sky.
         """
         count, bounces = config.parameters.vpl_count, config.light.most_bounces
-        pools = VplPools.of(count, has_lights=bool(view.lights), glows=glows, bounces=bounces)
+        has_lights = bool(view.lights) or sky_lights > 0
+        pools = VplPools.of(count, has_lights=has_lights, glows=glows, bounces=bounces)
         return cls(
             size=view.size,
-            face_count=face_count(view.lights, nested_faces),
-            rsm_resolution=rsm_resolution(view.lights, config.quality),
-            importance_cells=importance_cells(face_count(view.lights, nested_faces=0)),
+            face_count=face_count(view.lights, nested_faces) + sky_lights,
+            rsm_resolution=rsm_resolution(view.lights, config.quality, sky_lights),
+            importance_cells=importance_cells(face_count(view.lights, nested_faces=0) + sky_lights),
             pools=pools,
             bounces=bounces,
             interleave=config.quality.interleave_for(pools.reflected, view.size),
@@ -164,11 +169,14 @@ class Frame:
         ]
         """Light from VPLs."""
         self._near_field_wanted = near_field.wanted
-        self._material_resolve = MaterialResolvePass(resources)
+        self._material_resolve = MaterialResolvePass(
+            resources, glows=scene.glows, shows_sky="environment_map" in resources
+        )
         self._tone_mapping = ToneMappingPass(resources)
 
     def draw(self, inputs: FrameInputs, clock: PassClock | None = None) -> None:
         """Draw up to the irradiance buffers; `clock` times each pass."""
+        self._camera = inputs.camera
         self._write_lights(inputs.records)
         self._write_parameters(inputs.parameters)
         self._run([*self._seen, *self._placed, *self._gathered], inputs, clock)
@@ -193,7 +201,7 @@ class Frame:
         `share` weighs direct and indirect light; `exposure` None measures it from the image.
         """
         with _timed(clock, self._material_resolve.name):
-            self._material_resolve.draw(share)
+            self._material_resolve.draw(share, self._camera)
         with _timed(clock, self._tone_mapping.name):
             self._tone_mapping.draw(exposure)
 
@@ -227,10 +235,12 @@ class Frame:
     def _make_targets(self) -> None:
         resources, setup = self.resources, self.setup
         context, size = resources.context, setup.size
-        self.gbuffer = create_gbuffer(context, size)
+        self.gbuffer = create_gbuffer(context, size, glows=self.scene.glows)
         self.rsm = create_reflective_shadow_map(context, setup.rsm_resolution, setup.face_count)
         for name in ("depth", "normal", "albedo"):
             resources[f"gbuffer_{name}"] = getattr(self.gbuffer, name)
+        if self.gbuffer.emission is not None:
+            resources["gbuffer_emission"] = self.gbuffer.emission
         for name in ("depth", "normal", "reflectance"):
             resources[f"rsm_{name}"] = getattr(self.rsm, name)
         names = ["direct", "vpl", "near_field", "shared"] + ["punctual"] * (setup.pools.glowing > 0)
@@ -323,7 +333,13 @@ class Frame:
 
 
 def frame_light_records(
-    scene: SceneBuffers, view: View, rsm_resolution: int, nested_faces: int, *, snapped: bool
+    scene: SceneBuffers,
+    view: View,
+    rsm_resolution: int,
+    nested_faces: int,
+    sky: tuple[Light, ...] = (),
+    *,
+    snapped: bool,
 ) -> LightRecords:
     """The view's lights as records for the scene as it stands.
 
@@ -331,13 +347,14 @@ def frame_light_records(
         scene: gives the bounds.
         view: camera and lights.
         rsm_resolution: texels along the side of a face.
-        nested_faces: of each directional light.
+        nested_faces: of each directional light of the view.
+        sky: lights that stand for the scene's sky.
         snapped: whether a directional light's faces keep their grid in the world while things move.
     """
     length = float(np.linalg.norm(scene.rest_bounds[1] - scene.rest_bounds[0])) if snapped else None
     x, y, z = view.camera.position_world.tolist()
     return light_records(
-        view.lights, scene.bounds(), SunGrid(rsm_resolution, (x, y, z), nested_faces, length)
+        view.lights, scene.bounds(), SunGrid(rsm_resolution, (x, y, z), nested_faces, length), sky
     )
 
 

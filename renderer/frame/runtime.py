@@ -1,19 +1,18 @@
 """The runtime: draws a scene, one view and one config at a time."""
 
-import functools
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
-from typing import Any, Literal, get_args
+from collections.abc import Sequence
+from typing import Literal, get_args
 
 import moderngl
 import numpy as np
 from jaxtyping import Float32
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters, placement
+from vpltune.renderer.config.artist_parameters import placement
 from vpltune.renderer.config.tuned_config import TunedConfig
-from vpltune.renderer.errors import MachineError
-from vpltune.renderer.frame.capture import CapturedFrame, capture_frame, in_world_units, read_image
+from vpltune.renderer.frame.capture import CapturedFrame, read_image
 from vpltune.renderer.frame.clip_state import ClipState
+from vpltune.renderer.frame.drawn_frame import DrawnFrame, on_own_context
 from vpltune.renderer.frame.frame import Frame, FrameSetup, frame_light_records
 from vpltune.renderer.frame.frame_pass import FrameInputs
 from vpltune.renderer.frame.frame_timing import PassClock, frame_milliseconds
@@ -26,7 +25,8 @@ from vpltune.renderer.gpu.ray_hierarchy import RayHierarchy
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
 from vpltune.renderer.scene.animation import Pose
 from vpltune.renderer.scene.dynamic_lights import DynamicLights, scaled_records
-from vpltune.renderer.scene.scene import Scene, scaled
+from vpltune.renderer.scene.scene import Light, Scene, scaled
+from vpltune.renderer.scene.sky_lights import sky_lights
 from vpltune.renderer.scene.sun_faces import nested_face_count
 from vpltune.renderer.scene.views import View, scaled_view
 from vpltune.renderer.scene.working_scale import working_scale
@@ -39,71 +39,6 @@ KEPT_FRAMES = 2
 """Frames whose targets stay on the GPU: two, for a comparison of two configs; more would add up."""
 
 _SHARES = {"direct": (1.0, 0.0), "indirect": (0.0, 1.0)}
-
-
-def _on_own_context(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Make the object's context current before a call: another runtime may have taken its place.
-
-    It stays current. moderngl's `with context` would leave none current behind it, not the one before.
-    """
-
-    @functools.wraps(method)
-    def on_own_context(self: "Runtime | DrawnFrame", *arguments: object, **keywords: object) -> Any:
-        self.context.__enter__()
-        try:
-            return method(self, *arguments, **keywords)
-        except moderngl.Error as error:
-            # Targets that do not fit into memory leave a framebuffer incomplete; all else is a defect.
-            if "not complete" not in str(error):
-                raise
-            renderer = self.context.info["GL_RENDERER"]
-            raise MachineError(f"OpenGL: {error} ({renderer}); a smaller --size may do") from error
-
-    return on_own_context
-
-
-class DrawnFrame:
-    """A frame as it was drawn, still on the GPU; it holds until the runtime draws again."""
-
-    def __init__(self, frame: Frame, inputs: FrameInputs, view: View, config: TunedConfig, scale: float):
-        self.frame = frame
-        self.inputs = inputs
-        self._scale = scale
-        self._view = view
-        self._config = config
-
-    @property
-    def context(self) -> moderngl.Context:
-        """The OpenGL context that it was drawn on."""
-        return self.frame.resources.context
-
-    @property
-    def display(self) -> moderngl.Texture:
-        """The 8-bit display image, row 0 at the bottom."""
-        return self.frame.texture("display")
-
-    @_on_own_context
-    def read_exposure(self) -> float:
-        """What radiance was multiplied by for display: waits for the GPU."""
-        return self.frame.read_exposure()
-
-    @_on_own_context
-    def read_parameters(self) -> ArtistParameters:
-        """The parameters that it was drawn with; waits for the GPU where a prior set some of them."""
-        return self._config.parameters if self._config.auto is None else self.frame.read_parameters()
-
-    @_on_own_context
-    def capture(self, *, maps: bool = True) -> CapturedFrame:
-        """Read back the buffers that the gather reads and makes; `maps` False leaves out visibility maps."""
-        discs = self._config.parameters.vpls_are_discs
-        captured = capture_frame(self.frame, self._view, discs=discs, maps=maps)
-        check_errors(self.context, f"the buffers of view {self._view.name}")
-        return in_world_units(captured, self._scale)
-
-    @_on_own_context
-    def read_statistics(self) -> Float32[np.ndarray, " statistics"]:
-        """The scene statistics that `renderer.config.scene_statistics` names: waits for the GPU."""
-        return self.frame.read_statistics(self.inputs)
 
 
 class Runtime:
@@ -134,6 +69,7 @@ class Runtime:
         self._scale = working_scale(scene)
         self._scene = scene = scaled(scene, self._scale) if self._scale != 1.0 else scene
         self.scene_buffers = SceneBuffers(self._context, scene)
+        self._skies: dict[int, tuple[Light, ...]] = {}
         self._glowing = GlowingTriangles(self._context, scene, self.scene_buffers)
         self._hierarchy: RayHierarchy | None = None
         self._nested_faces = nested_face_count(scene)
@@ -147,13 +83,13 @@ class Runtime:
         """The OpenGL context, for other runtimes to share."""
         return self._context
 
-    @_on_own_context
+    @on_own_context
     def pose(self, pose: Pose) -> None:
         """Move the scene; takes effect with the next image."""
         grow = np.diag([self._scale, self._scale, self._scale, 1.0])
         self.scene_buffers.set_pose(grow @ pose.transforms, grow @ pose.joint_matrices)
 
-    @_on_own_context
+    @on_own_context
     def render(
         self,
         view: View,
@@ -193,7 +129,7 @@ class Runtime:
         drawn.frame.resolve(_SHARES.get(layer, (1.0, 1.0)), exposure)
         return self._read(drawn, "display" if layer == "final" else "radiance", f"layer {layer}", view)
 
-    @_on_own_context
+    @on_own_context
     def draw(
         self,
         view: View,
@@ -212,7 +148,7 @@ class Runtime:
         drawn.frame.resolve((1.0, 1.0), exposure)
         return drawn
 
-    @_on_own_context
+    @on_own_context
     def render_radiance(
         self,
         view: View,
@@ -226,7 +162,7 @@ class Runtime:
         drawn.frame.resolve((1.0, 1.0), 1.0)
         return self._read(drawn, "radiance", "the radiance", view)
 
-    @_on_own_context
+    @on_own_context
     def display(self, radiance: np.ndarray, exposure: float | None = None) -> np.ndarray:
         """Any radiance image, [height, width, 3 or 4], through this runtime's exposure and tone curve.
 
@@ -235,12 +171,12 @@ class Runtime:
         frame = self._tone_mapped(radiance, exposure)
         return np.ascontiguousarray(read_image(frame.resources, "display")[..., :3])
 
-    @_on_own_context
+    @on_own_context
     def measured_exposure(self, radiance: np.ndarray) -> float:
         """The exposure that `display` measures for a radiance image."""
         return self._tone_mapped(radiance, None).read_exposure()
 
-    @_on_own_context
+    @on_own_context
     def capture(
         self,
         view: View,
@@ -261,7 +197,7 @@ class Runtime:
         drawn = self._draw(view, config, state, table_rotation=table_rotation, lights=lights)
         return drawn.capture(maps=maps)
 
-    @_on_own_context
+    @on_own_context
     def captures(
         self, view: View, config: TunedConfig, table_rotations: Sequence[tuple[float, float]]
     ) -> list[CapturedFrame]:
@@ -276,7 +212,7 @@ class Runtime:
             captured.append(drawn.capture())
         return captured
 
-    @_on_own_context
+    @on_own_context
     def capture_variants(
         self,
         view: View,
@@ -305,7 +241,7 @@ class Runtime:
             images.append(self._read(drawn, "indirect_irradiance", "the irradiance", view))
         return captured, images
 
-    @_on_own_context
+    @on_own_context
     def pass_milliseconds(
         self, view: View, config: TunedConfig, frames: int = 5, lights: DynamicLights | None = None
     ) -> dict[str, float]:
@@ -318,7 +254,7 @@ class Runtime:
             clock.end_frame()
         return clock.milliseconds()
 
-    @_on_own_context
+    @on_own_context
     def frame_milliseconds(
         self, view: View, config: TunedConfig, frames: int = 5, lights: DynamicLights | None = None
     ) -> float:
@@ -373,6 +309,7 @@ class Runtime:
                 view,
                 frame.setup.rsm_resolution,
                 self._nested_faces,
+                self._sky(config),
                 snapped=self.options.rsm_snapping,
             ),
             parameters=config.parameters,
@@ -403,4 +340,13 @@ class Runtime:
         return frame
 
     def _setup(self, view: View, config: TunedConfig) -> FrameSetup:
-        return FrameSetup.of(view, config, self._nested_faces, glows=self._glowing.count > 0)
+        glows, sky = self._glowing.count > 0, len(self._sky(config))
+        return FrameSetup.of(view, config, self._nested_faces, glows=glows, sky_lights=sky)
+
+    def _sky(self, config: TunedConfig) -> tuple[Light, ...]:
+        environment, count = self._scene.environment, config.light.sky_lights
+        if environment is None:
+            return ()
+        if count not in self._skies:
+            self._skies[count] = sky_lights(environment, count)
+        return self._skies[count]

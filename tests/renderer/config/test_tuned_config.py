@@ -103,7 +103,7 @@ def test_an_empty_light_or_provenance_is_not_written():
         ({"bounces": True}, "light.bounces: must be"),
         ({"bounces": "some"}, "light.bounces: must be"),
         ({"bounces": [1]}, "light.bounces: must be"),
-        ({"bounce": 1}, "light: unknown key 'bounce'; known is bounces"),
+        ({"bounce": 1}, "light: unknown key 'bounce'; known are bounces, sky_lights"),
         ([], "light: must be an object, got list"),
     ],
 )

@@ -16,8 +16,8 @@ import numpy as np
 from benchmarks.harness.machine_rates import MachineRates
 from benchmarks.speed.surrogate import FLOPS_PER_PAIR
 from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.drawn_frame import DrawnFrame
 from vpltune.renderer.frame.frame_timing import PassClock
-from vpltune.renderer.frame.runtime import DrawnFrame
 from vpltune.renderer.gpu.resources import Access, Resource, Resources
 
 DISC_OPERATIONS = 170.0

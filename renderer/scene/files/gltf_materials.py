@@ -1,4 +1,4 @@
-"""glTF materials: base-colour factors and textures. A diffuse material has no use for the rest."""
+"""glTF materials: base colours and emission. A diffuse material has no use for the rest."""
 
 from dataclasses import dataclass, replace
 
@@ -8,6 +8,7 @@ from jaxtyping import Float64
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, label
 from vpltune.renderer.scene.files.gltf_accessors import GltfAccessors
 from vpltune.renderer.scene.files.gltf_document import GltfDocument
+from vpltune.renderer.scene.files.gltf_emission import GltfEmission
 from vpltune.renderer.scene.files.gltf_textures import (
     GltfTextures,
     Layers,
@@ -33,7 +34,7 @@ class BaseColor:
     material: int
     """Index into the scene's materials."""
     uv_set: int | None = None
-    """The set of texture coordinates, n of TEXCOORD_n; None without a texture."""
+    """The set of texture coordinates, n of TEXCOORD_n, for all textures; None without a texture."""
     uv_transform: Float64[np.ndarray, "2 3"] | None = None
     """The KHR_texture_transform, if any."""
 
@@ -44,6 +45,7 @@ class GltfMaterials:
     def __init__(self, document: GltfDocument, accessors: GltfAccessors, ktx2: LimitedDecoder) -> None:
         self._document = document
         self._textures = GltfTextures(document, accessors, ktx2)
+        self._emission = GltfEmission(document, self._textures)
         self.materials: list[Material] = []
         self._base_colors: dict[str, BaseColor] = {}
         self._left_out: set[str] = set()
@@ -105,10 +107,19 @@ class GltfMaterials:
         read = self._transmitting(read, material, color, 1.0 - metallic)
         read = without_idle_alpha(read, None if texture is None else self.textures[texture])
         say_blended(read, self._document.warnings)
+        placed = None if texture is None else layers.placed
+        glow = self._emission.of(material, placed)
+        read = replace(
+            read,
+            emission=glow.radiance,
+            emission_texture=glow.texture,
+            emits_both_ways=glow.both_ways,
+        )
         self.materials.append(read)
-        if layers.placed is None or texture is None:
+        placed = placed or glow.placed
+        if placed is None:
             return BaseColor(len(self.materials) - 1)
-        return BaseColor(len(self.materials) - 1, uv_set(layers.placed), uv_transform(layers.placed))
+        return BaseColor(len(self.materials) - 1, uv_set(placed), uv_transform(placed))
 
     def _transmitting(
         self, read: Material, material: JsonObject, color: JsonObject | None, matt: float
@@ -153,13 +164,6 @@ class GltfMaterials:
 
     def _warn_of_ignored(self, material: JsonObject) -> None:
         warnings = self._document.warnings
-        emissive = material.numbers("emissiveFactor", 3, default=(0.0, 0.0, 0.0))
-        strength = material.extension("KHR_materials_emissive_strength")
-        if (emissive > 0.0).any() and (strength is None or strength.number("emissiveStrength", 1.0) > 0.0):
-            warnings.tally(
-                "1 material emits light; emission does not light the scene yet",
-                "{n} materials emit light; emission does not light the scene yet",
-            )
         if material.extension("KHR_materials_diffuse_transmission") is not None:
             warnings.tally(
                 "1 material transmits light diffusely; it is drawn opaque",

@@ -82,6 +82,11 @@ def finished_mesh(
     return Mesh(name, surface.positions, normals, uv, colors, triangles, material, surface.skinning)
 
 
+def turned(mesh: Mesh) -> Mesh:
+    """The mesh wound the other way: what was its back is its front. The normals point there too."""
+    return replace(mesh, triangles=np.ascontiguousarray(mesh.triangles[:, ::-1]), normals=-mesh.normals)
+
+
 def require_within(values: np.ndarray | None, what: str, largest: float, where: str) -> None:
     """Check that no number, if there are any, is larger than `largest` in magnitude.
 

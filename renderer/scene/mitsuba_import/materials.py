@@ -7,11 +7,11 @@ from jaxtyping import Float64, UInt8
 
 from vpltune.renderer.files.srgb import linear_from_srgb, srgb_from_linear
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, label
+from vpltune.renderer.scene.files.exr_pixels import exr_channels
 from vpltune.renderer.scene.files.image_texels import MTL_FORMATS, ImageDecoder
 from vpltune.renderer.scene.files.opacity import say_blended, without_idle_alpha
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
 from vpltune.renderer.scene.files.texel_products import of_size
-from vpltune.renderer.scene.mitsuba_import.environment_map import exr_channels
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
 from vpltune.renderer.scene.scene import Material, Texture, Wrap
 

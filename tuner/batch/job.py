@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from vpltune.renderer.files.atomic_file import write_text_whole
 
@@ -35,7 +35,6 @@ class JobOptions:
     """Start of the fit: the text of a config file."""
     views: int = 4
     seed: int = 0
-    bounces: Literal["1", "all"] = "1"
     size: tuple[int, int] | None = None
     """Width and height of the views in pixels; None for the default of a fit."""
 
@@ -49,9 +48,7 @@ class JobOptions:
         from vpltune.tuner.scene_fit.fit_scene import FitOptions
 
         start = parse_config(self.start, "the start of the fit")
-        options = FitOptions(
-            start=start, views=self.views, seed=self.seed, bounces=self.bounces, command=command
-        )
+        options = FitOptions(start=start, views=self.views, seed=self.seed, command=command)
         return options if self.size is None else replace(options, size=self.size)
 
 

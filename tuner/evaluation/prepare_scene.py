@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
 
+from vpltune.renderer.config.light_settings import LightSettings
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.frame.runtime import Runtime
@@ -46,8 +46,6 @@ class SceneOptions:
     held_out: int | None = None
     """Number of held-out views; None takes half as many as are fitted, but at least one."""
     seed: int = 0
-    bounces: Literal["1", "all"] = "1"
-    """Bounces of indirect light in the references."""
     camera: Camera | None = None
     """Replaces the camera of the file, of its sidecar or of the automatic placement."""
     camera_name: str | None = None
@@ -142,7 +140,7 @@ def prepare_scene(
         look_first(runtime, views)
     with watch.stage("reference"):
         references = references_of(
-            scene, views, options.seed, options.bounces, lambda share: progress("reference", share)
+            scene, views, options.seed, config.light, lambda share: progress("reference", share)
         )
     with watch.stage("capture"):
         progress("capture", 0.0)
@@ -160,12 +158,13 @@ def references_of(
     scene: Scene,
     views: tuple[View, ...],
     seed: int,
-    bounces: Literal["1", "all"],
+    light: LightSettings,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[ReferenceView, ...]:
     """References of `views` at the noise target of fits and evaluations, from the cache if they are there.
 
-    `progress` is called with the share of all views done, in [0, 1].
+    They have the light that `light` asks for. `progress` is called with the share of all views done, in
+    [0, 1].
     """
     return reference_views(
         scene,
@@ -173,7 +172,7 @@ def references_of(
         seed=seed,
         noise_target=NOISE_TARGET,
         max_samples=MAX_SAMPLES,
-        bounces=1 if bounces == "1" else None,
+        bounces=light.most_bounces,
         progress=None if progress is None else lambda _view, share: progress(share),
     )
 

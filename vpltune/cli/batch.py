@@ -57,7 +57,7 @@ def batch(
     size: ViewSizeOption = None,
     seed: SeedOption = 0,
     visibility: VisibilityOption = None,
-    bounces: BouncesOption = "1",
+    bounces: BouncesOption = None,
     workers: Annotated[
         int | None,
         typer.Option(
@@ -123,13 +123,12 @@ def batch(
     from vpltune.tuner.batch.batch import run_batch
     from vpltune.tuner.batch.job import JobOptions
 
-    start, overridden = with_flags(read_config(config), visibility=visibility)
+    start, overridden = with_flags(read_config(config), visibility=visibility, bounces=bounces)
     warn(overridden)
     options = JobOptions(
         start=config_text(start),
         views=views,
         seed=seed,
-        bounces=bounces,
         size=None if size is None else parse_size(size),
     )
     if scheduler is not None and slurm is not None:

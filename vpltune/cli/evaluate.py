@@ -32,7 +32,7 @@ def evaluate(
     ] = str(VIEW_COUNT),
     seed: SeedOption = 0,
     visibility: VisibilityOption = None,
-    bounces: BouncesOption = "1",
+    bounces: BouncesOption = None,
     split_error: SplitErrorOption = False,
     *,
     flags: ViewFlags,
@@ -49,12 +49,11 @@ def evaluate(
     from vpltune.renderer.config.tuned_config import read_config
     from vpltune.tuner.scene_fit.evaluate_scene import EvaluateOptions, evaluate_scene
 
-    tuned, overridden = with_flags(read_config(config), visibility=visibility)
+    tuned, overridden = with_flags(read_config(config), visibility=visibility, bounces=bounces)
     warn(overridden)
     options = EvaluateOptions(
         tuned=tuned,
         seed=seed,
-        bounces=bounces,
         split_error=split_error,
         camera=camera_from_flags(flags),
         light=light_from_flags(flags),

@@ -65,7 +65,7 @@ def fit(
         bool,
         typer.Option("--motion", help="Accept a fit only if it flickers no more than the start."),
     ] = False,
-    bounces: BouncesOption = "1",
+    bounces: BouncesOption = None,
     split_error: SplitErrorOption = False,
     *,
     flags: ViewFlags,
@@ -81,7 +81,7 @@ def fit(
     from vpltune.tuner.scene_fit.fit_scene import FitOptions, fit_scene
 
     given = views_or_file(views, flags != ViewFlags())
-    start, overridden = with_flags(read_config(config), visibility=visibility)
+    start, overridden = with_flags(read_config(config), visibility=visibility, bounces=bounces)
     warn(overridden)
     options = FitOptions(
         start=with_vpl_count(start, vpl_count),
@@ -90,7 +90,6 @@ def fit(
         views=given if isinstance(given, int) else len(given[1]),
         fixed_views=None if isinstance(given, int) else given[1],
         seed=seed,
-        bounces=bounces,
         split_error=split_error,
         camera=camera_from_flags(flags),
         camera_name=flags.camera,

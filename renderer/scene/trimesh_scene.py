@@ -29,8 +29,9 @@ def scene_from_trimesh(
     """The scene of a `trimesh.Scene` or `trimesh.Trimesh`. +Y is up where a camera is placed.
 
     Colours of vertices and faces are taken as sRGB, as in a PLY file; factors of materials are linear. A
-    material's image is its texture, and its emissive factor is emission in W/(m² sr), without a texture. What has no colour is white. A camera that was set in trimesh is taken;
-    lights are not, because trimesh makes up some by itself. Point clouds and paths get a warning.
+    material's image is its texture, its emissive factor is what it emits in W/(m² sr). What has no colour is
+    white. A camera that was set in trimesh is taken; lights are not, because trimesh makes up some by itself.
+    Point clouds and paths get a warning.
 
     Args:
         source: the scene or mesh.

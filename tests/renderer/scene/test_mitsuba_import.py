@@ -5,6 +5,7 @@ import math
 
 import mitsuba as mi
 import numpy as np
+import OpenEXR
 import pytest
 from PIL import Image
 
@@ -17,6 +18,8 @@ from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.environment import Environment, solid_angles, texel_directions
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.mitsuba_import import read_mitsuba
+from vpltune.renderer.scene.placement import with_environment
+from vpltune.renderer.scene.placement.scene_sidecar import read_sidecar
 from vpltune.renderer.scene.transforms import transform_normals, transform_points
 from vpltune.renderer.scene.views import View
 
@@ -423,6 +426,27 @@ def test_names_are_looked_at_first(tmp_path, capfd, monkeypatch, arguments, mess
     monkeypatch.chdir(tmp_path)
     assert run(["import", *arguments]) == 2
     assert message in capfd.readouterr().err
+
+
+def test_an_environment_goes_beside_the_file(tmp_path, capfd):
+    sky = np.random.default_rng(1).uniform(0.0, 3.0, (8, 16, 3)).astype(np.float32)
+    OpenEXR.File({}, {"RGB": sky}).write(str(tmp_path / "sky.exr"))
+    more = """<emitter type="envmap"><string name="filename" value="sky.exr"/></emitter>"""
+    path = scene_file(tmp_path, more=more + AREA_LIGHT.format(shape="disk", more=""))
+    output = tmp_path / "out" / "room.glb"
+    output.parent.mkdir()
+    (tmp_path / "out" / "room.vpltune.toml").write_text(
+        '[[light]]\ntype = "point"\nposition = [1, 2, 3]\nintensity = 4\n'
+    )
+    assert run(["import", str(path), "-o", str(output), "--json"]) == 0
+    report = json.loads(capfd.readouterr().out)
+    assert report["environment"] == str(tmp_path / "out" / "room.environment.exr")
+    sidecar = read_sidecar(tmp_path / "out" / "room.vpltune.toml")
+    assert sidecar.lights[0].kind == "point" and sidecar.camera is None
+    scene = with_environment(read_scene(output), output)
+    np.testing.assert_array_equal(scene.environment.radiance, sky)
+    (lamp,) = [material for material in scene.materials if material.glows]
+    assert lamp.emission == (4.0, 2.0, 1.0) and not lamp.emits_both_ways
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 // it meets a surface. Each reflection leaves a sample, a VPL whose flux is what the surface reflects.
 //
 // Reads: starts (samples drawn from the RSM, and from glowing surfaces), directions, ray hierarchy.
-// Writes: samples, [steps, walks], dark ones where a walk has left the scene. One invocation for each walk.
+// Writes: samples, [walks, steps], dark ones where a walk has left the scene. One invocation for each walk.
 // Constants: WALK_LAMPS and WALK_GLOWING (1 if there are such starts), GLOWING_SAMPLES, WALK_STEPS, WALK_ENDS (1 if the
 // last step stands for all that would follow).
 // Python: renderer/frame/passes/light_walks.py.
@@ -120,7 +120,7 @@ void main() {
         if (reflected.normal_area.w == 0.0) {
             place.flux = vec4(0.0);
         }
-        later_samples[i * walk_count + walk] = reflected;
+        later_samples[walk * WALK_STEPS + i] = reflected;
         numbers = vec2(unit_number(hashed(seed ^ uint(2 * i + 2))), unit_number(hashed(seed ^ uint(2 * i + 3))));
     }
 }

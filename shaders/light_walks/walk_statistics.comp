@@ -32,7 +32,7 @@ void main() {
     vec4 flux_position = vec4(0.0);
     vec2 rest = vec2(0.0);
     for (int walk = lane; walk < walk_count; walk += WALK_GROUP_SIZE) {
-        VirtualPointLight one = later_samples[walk];
+        VirtualPointLight one = later_samples[walk * WALK_STEPS];
         float flux = mean_flux(one);
         rest.y += flux;
 #if WALK_GLOWING

@@ -21,7 +21,8 @@ def check_written(scene_path):
     scene = read_scene(scene_path)
     camera, lights, _ = resolve_camera_and_lights(scene, scene_path, None, None)
     assert run(["init", str(scene_path)]) == 0
-    own_camera, own_lights = read_sidecar(scene_path.with_suffix(".vpltune.toml"))
+    own = read_sidecar(scene_path.with_suffix(".vpltune.toml"))
+    own_camera, own_lights = own.camera, own.lights
     # Fifteen digits are written; the matrix of a look_at is another way to the same.
     np.testing.assert_allclose(own_camera.to_world, camera.to_world, atol=1e-6)
     assert [light.kind for light in own_lights] == [light.kind for light in lights]

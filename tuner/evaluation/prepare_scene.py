@@ -14,7 +14,9 @@ from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.files.reading_border import read_at_border
 from vpltune.renderer.scene.placement import named_cameras, resolve_camera_and_lights, views_for_scene
+from vpltune.renderer.scene.placement.given_sky import GivenSky
 from vpltune.renderer.scene.placement.scene_sidecar import completed_camera_and_lights
+from vpltune.renderer.scene.placement.scene_sky import with_environment
 from vpltune.renderer.scene.scene import Camera, Light, Scene
 from vpltune.renderer.scene.views import SPLITS, View
 from vpltune.renderer.scene.working_scale import require_drawable
@@ -52,6 +54,8 @@ class SceneOptions:
     """A camera of the file by name or number, or `all` of them, which then share the views."""
     light: Light | None = None
     """Replaces the lights of the file, of its sidecar or of the automatic placement."""
+    sky: GivenSky | None = None
+    """Replaces the environment of the file or of its sidecar."""
     size: tuple[int, int] = VIEW_SIZE
     """Width and height of the views, in pixels."""
     fixed_views: tuple[View, ...] | None = None
@@ -129,11 +133,11 @@ def prepare_scene(
         progress("load", 0.0)
         digest = None
         if isinstance(source, Path):
-            scene = read_scene(source)
+            scene = with_environment(read_scene(source), source, options.sky)
             with source.open("rb") as file:
                 digest = hashlib.file_digest(file, "sha256").hexdigest()
         else:
-            scene = _required_drawable(source)
+            scene = with_environment(_required_drawable(source), None, options.sky)
         views, notes = _views(scene, source, options, validated)
         # Before the references, so that a machine without OpenGL fails at once.
         runtime = Runtime(scene)

@@ -75,12 +75,12 @@ def fit(
     from vpltune.cli.budget_flags import budget_from_flags, with_vpl_count
     from vpltune.cli.progress_display import shown_progress
     from vpltune.cli.quality_flags import with_flags
-    from vpltune.cli.view_flags import camera_from_flags, light_from_flags
+    from vpltune.cli.view_flags import camera_from_flags, light_from_flags, sky_from_flags
     from vpltune.cli.views_or_file import views_or_file
     from vpltune.renderer.config.tuned_config import read_config
     from vpltune.tuner.scene_fit.fit_scene import FitOptions, fit_scene
 
-    given = views_or_file(views, flags != ViewFlags())
+    given = views_or_file(views, flags.place_a_view)
     start, overridden = with_flags(read_config(config), visibility=visibility, bounces=bounces)
     warn(overridden)
     options = FitOptions(
@@ -94,6 +94,7 @@ def fit(
         camera=camera_from_flags(flags),
         camera_name=flags.camera,
         light=light_from_flags(flags),
+        sky=sky_from_flags(flags.sky, flags.environment),
         command=command_line(),
     )
     if size is not None:

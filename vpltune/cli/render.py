@@ -117,13 +117,11 @@ def render(
     warn(overridden)
 
     from vpltune.renderer.frame.runtime import Runtime
-    from vpltune.renderer.scene.files import read_scene
     from vpltune.renderer.scene.scene import scaled
     from vpltune.renderer.scene.sequence import Sequence
     from vpltune.renderer.scene.views import scaled_view
 
-    loaded = read_scene(scene)
-    warn(loaded.warnings)
+    loaded = chosen.read(scene)
     drawn = chosen.placed(loaded, scene)
     sequence = Sequence(loaded, drawn, motion, factor)
     if factor != 1.0:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float64, UInt8
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, label
 from vpltune.renderer.scene.files.gltf_accessors import GltfAccessors
@@ -49,6 +49,8 @@ class GltfMaterials:
         self.materials: list[Material] = []
         self._base_colors: dict[str, BaseColor] = {}
         self._left_out: set[str] = set()
+        self._unreadable: dict[str, str] = {}
+        """Why metallic images cannot be read, by their places."""
 
     @property
     def textures(self) -> list[Texture]:
@@ -187,8 +189,10 @@ class GltfMaterials:
         factor = holder.number("metallicFactor", 1.0, low=0.0, high=1.0)
         info = holder.object("metallicRoughnessTexture")
         image = None if info is None or factor == 0.0 else self._textures.image(info)
-        if info is not None and image is not None:
-            metalness = self._textures.texels(image)[..., 2]
+        metalness = None if image is None else self._metal_texels(image)
+        if metalness is None:
+            image = None
+        elif info is not None:
             if metalness.min() == metalness.max():
                 factor, info = factor * int(metalness.min()) / 255.0, None
             elif color is not None and not placed_alike(info, color):
@@ -203,3 +207,21 @@ class GltfMaterials:
                 "{n} materials are metallic; their diffuse parts are drawn, their reflections are not",
             )
         return factor, info if image is not None else None
+
+    def _metal_texels(self, image: JsonObject) -> UInt8[np.ndarray, "height width"] | None:
+        """The metalness of an image; None, with a warning, where it is missing or broken.
+
+        Only a base colour's image is worth a refusal: without this one, the surfaces are still those of the
+        file, and their factor says how metallic they are.
+        """
+        if image.where not in self._unreadable:
+            try:
+                return self._textures.texels(image)[..., 2]
+            except SceneFileError as error:
+                self._unreadable[image.where] = str(error)
+        first = next(iter(self._unreadable.values()))
+        self._document.warnings.tally(
+            f"1 metallic texture counts as white: {first}",
+            f"{{n}} metallic textures count as white; for one, {first}",
+        )
+        return None

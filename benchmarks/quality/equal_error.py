@@ -192,10 +192,9 @@ def equal_error(scene: Path | int, effort: Effort) -> EqualError:
         return relmse_without_noise(image[valid], half_a[valid], half_b[valid])
 
     traced = traced_scene(read)
-    parts = (traced.wavefront, traced.surfaces, traced.triangles, view)
     peers: dict[str, IndirectIrradiance] = {
-        "plain path tracing": PlainPathTracing(*parts),
-        "the reference estimator": IndirectIrradiance(*parts),
+        "plain path tracing": PlainPathTracing(traced, view),
+        "the reference estimator": IndirectIrradiance(traced, view),
     }
     for peer in peers.values():
         traced_run(peer, 2, 0, error)  # compiles
@@ -228,8 +227,8 @@ def traced_run(
     """Trace `samples` per pixel, a half of them in each of the peer's two estimates."""
     start = time.process_time()
     total = np.zeros(())
-    for _, batch in peer.batches(0, samples // 2, seed, 1):
-        total = total + batch.sum(axis=0, dtype=np.float64)
+    for batch in peer.batches(0, samples // 2, seed, 1):
+        total = total + batch.irradiance.sum(axis=0, dtype=np.float64)
     seconds = time.process_time() - start
     return TracedRun(samples, seconds, error(total / (samples // 2 * 2)))
 

@@ -58,9 +58,8 @@ def store(key: str, reference: ReferenceView) -> None:
     A folder that cannot be written to is logged as a warning; it raises nothing.
     """
     global _stored_bytes
-    arrays: dict[str, Any] = {
-        field.name: np.asarray(getattr(reference, field.name)) for field in fields(reference)
-    }
+    values = {field.name: getattr(reference, field.name) for field in fields(reference)}
+    arrays: dict[str, Any] = {name: np.asarray(value) for name, value in values.items() if value is not None}
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)
     payload = buffer.getvalue()

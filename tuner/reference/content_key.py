@@ -15,7 +15,8 @@ of older versions are then ignored."""
 
 
 def scene_digest(scene: Scene) -> str:
-    """Hex SHA-256 of a scene's geometry, materials and textures, without names, lights and cameras."""
+    """Hex SHA-256 of a scene's geometry, materials, textures and environment, without names, lights and
+    cameras. What does not glow adds nothing of its emission."""
     digest = hashlib.sha256()
     for mesh in scene.meshes:
         for array in (mesh.positions, mesh.normals, mesh.uv, mesh.colors, mesh.triangles):
@@ -30,11 +31,17 @@ def scene_digest(scene: Scene) -> str:
         if not material.is_opaque:
             alpha = f"{material.alpha_mode} {material.opacity!r} {material.alpha_cutoff!r};"
             digest.update(alpha.encode())
+        if material.glows:
+            glow = f"{material.emission_texture} {material.emits_both_ways}"
+            digest.update(f"emission {tuple(map(float, material.emission))!r} {glow};".encode())
     for texture in scene.textures:
         digest.update(f"wrap {texture.wrap_u} {texture.wrap_v};".encode())
         _add_array(digest, texture.texels_srgb)
         if texture.opacity is not None:
             _add_array(digest, texture.opacity)
+    if scene.environment is not None:
+        digest.update(b"environment;")
+        _add_array(digest, scene.environment.radiance)
     return digest.hexdigest()
 
 

@@ -3,10 +3,14 @@
     E_ind(x) = ∫ L(x, ω) cos θ dω,    L(x, ω) = ρ(y)/π · (E_direct(y) + E_ind(y))
 
 y is the surface that x sees along ω. For one bounce, E_ind(y) is left out. Two strategies sample y: a
-cosine-weighted direction from x, and a path from one of the lights, which finds the spots that narrow beams
-light. The balance heuristic combines them (Veach and Guibas 1995, "Optimally Combining Sampling Techniques",
-eq. 9). The sum is unbiased and has no spikes near corners. The albedo of x is never divided out, so black
-receivers are as accurate as others. A path tracer's depth 3 minus depth 2 has the same expectation.
+cosine-weighted direction from x, and a path from one of the punctual lights, which finds the spots that
+narrow beams light. The balance heuristic combines them (Veach and Guibas 1995, "Optimally Combining Sampling
+Techniques", eq. 9). The sum is unbiased and has no spikes near corners. The albedo of x is never divided out,
+so black receivers are as accurate as others. A path tracer's depth 3 minus depth 2 has the same expectation.
+
+E_direct is the punctual lights' irradiance, which has no noise, plus that of glowing surfaces and the
+environment. The latter is sampled at x and at every y, by the direction that finds the next vertex and by a
+sample of the light (`emitted_light`). Where nothing glows, none of this is computed.
 
 Surfaces are two-sided and diffuse about their shading normals, like Mitsuba's `twosided` `diffuse`: light
 counts if it arrives on the visible side of the shading normal.
@@ -16,6 +20,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, UInt32
@@ -24,7 +29,8 @@ from vpltune.renderer.scene.views import View, ray_directions_world
 from vpltune.tuner.reference.directions import cosine_direction
 from vpltune.tuner.reference.punctual_lights import PunctualLights
 from vpltune.tuner.reference.sobol import hashed, owen_scrambled, reversed_sobol_points
-from vpltune.tuner.reference.surfaces import Surface, Surfaces
+from vpltune.tuner.reference.surfaces import Surface, cosine_density
+from vpltune.tuner.reference.traced_scene import TracedScene
 from vpltune.tuner.reference.unit_triangles import UnitTriangles
 
 LANE_SAMPLES_PER_LAUNCH = 2**21
@@ -38,8 +44,9 @@ ROULETTE_SURVIVAL = 0.95
 BOUNCE_LIMIT = 64
 """Every path ends here. A choice: it bounds the time in scenes that absorb nothing."""
 
-_SEEDS = 5  # per pixel: one scramble for each number of the first vertex, and one seed for the hash
-_NUMBERS_PER_VERTEX = 6  # light, roulette, direction (2), light path (2)
+_FIRST_NUMBERS = 4  # of the first vertex, from low-discrepancy points: direction (2), light path (2)
+_OTHER_NUMBERS = 2  # of every vertex: light, roulette
+_EMITTED_NUMBERS = 2  # more of both kinds of vertex where something glows: the light sample
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +59,20 @@ class PrimaryHits:
     """Shading normals of unit length, flipped towards the camera."""
     albedo: Float32[np.ndarray, "height width 3"]
     direct_irradiance: Float32[np.ndarray, "height width 3"]
-    """W/m², with shadows."""
+    """From punctual lights, W/m², with shadows."""
+    emission: Float32[np.ndarray, "height width 3"] | None
+    """Radiance that a pixel sees of what glows, also where it sees no surface: W/(m² sr). None if nothing
+    glows."""
+
+
+class Batch(NamedTuple):
+    """The sums over the samples of one kernel, for each half, in W/m²."""
+
+    samples: int
+    irradiance: Float32[np.ndarray, "2 height width 3"]
+    """Indirect."""
+    emitted: Float32[np.ndarray, "2 height width 3"] | None
+    """Direct, from what glows; None if nothing does."""
 
 
 class IndirectIrradiance:
@@ -63,8 +83,11 @@ class IndirectIrradiance:
     the second.
     """
 
-    def __init__(self, wavefront, surfaces: Surfaces, triangles: UnitTriangles, view: View):
+    def __init__(self, traced: TracedScene, view: View):
+        wavefront, surfaces, triangles = traced.wavefront, traced.surfaces, traced.triangles
         self._wavefront, self._surfaces, self._size = wavefront, surfaces, view.size
+        self._emitted = traced.emitted
+        self._first_numbers = _FIRST_NUMBERS + (0 if traced.emitted is None else _EMITTED_NUMBERS)
         self._lights = PunctualLights(surfaces, triangles, view.lights)
         eye = wavefront.vectors(triangles.to_unit(view.camera.position_world)[None, :])
         directions = ray_directions_world(view).reshape(-1, 3)
@@ -74,19 +97,22 @@ class IndirectIrradiance:
         def see():
             lanes = wavefront.all_true(2 * math.prod(view.size))
             seen = surfaces.first_along(eye, directions, lanes, seen=True)
-            return seen, self._lights.irradiance(seen, seen.hit)
+            glow = None if self._emitted is None else self._emitted.radiance(directions, seen)
+            return seen._replace(glow=()), self._lights.irradiance(seen, seen.hit), glow
 
-        self._seen, direct = wavefront.run(see)
-        wavefront.evaluate(*self._seen, direct)
-        self.primary_hits = self._to_world(triangles, direct)
+        self._seen, direct, glow = wavefront.run(see)
+        wavefront.evaluate(*self._seen, direct, glow)
+        self.primary_hits = self._to_world(triangles, direct, glow)
 
-    def _to_world(self, triangles: UnitTriangles, direct) -> PrimaryHits:
+    def _to_world(self, triangles: UnitTriangles, direct, glow) -> PrimaryHits:
         width, height = self._size
         valid = self._wavefront.to_numpy(self._seen.hit)[: width * height].reshape(height, width)
 
+        def whole(vectors) -> Float32[np.ndarray, "height width 3"]:
+            return self._wavefront.to_numpy(vectors)[: width * height].reshape(height, width, 3)
+
         def image(vectors) -> Float32[np.ndarray, "height width 3"]:
-            values = self._wavefront.to_numpy(vectors)[: width * height].reshape(height, width, 3)
-            return np.where(valid[..., None], values, np.float32(0.0))
+            return np.where(valid[..., None], whole(vectors), np.float32(0.0))
 
         position = image(self._seen.position).astype(np.float64) * triangles.diagonal
         return PrimaryHits(
@@ -95,11 +121,10 @@ class IndirectIrradiance:
             normal_world=image(self._seen.shading_normal),
             albedo=image(self._seen.albedo),
             direct_irradiance=image(direct),
+            emission=None if glow is None else whole(glow),
         )
 
-    def batches(
-        self, first: int, count: int, seed: int, bounces: int | None
-    ) -> Iterator[tuple[int, Float32[np.ndarray, "2 height width 3"]]]:
+    def batches(self, first: int, count: int, seed: int, bounces: int | None) -> Iterator[Batch]:
         """Take samples `first` … `first` + `count` − 1 of both halves, one kernel at a time.
 
         Args:
@@ -107,20 +132,20 @@ class IndirectIrradiance:
             count: Samples per pixel and half.
             seed: Seed of both halves' randomisation.
             bounces: Reflections before light arrives at the receiver; None for up to `BOUNCE_LIMIT`.
-
-        Yields:
-            Samples taken by one kernel, and their sum for each half in W/m².
         """
         w = self._wavefront
         width, height = self._size
         lanes = 2 * width * height
-        seeds = w.table(np.concatenate([_pixel_seeds(seed, half, width * height) for half in range(2)]))
+        rows = [_pixel_seeds(seed, half, width * height, self._first_numbers + 1) for half in range(2)]
+        seeds = w.table(np.concatenate(rows))
         limit = w.table(np.array([BOUNCE_LIMIT if bounces is None else bounces], np.uint32))
         most = max(1, LANE_SAMPLES_PER_LAUNCH // lanes)
         while count > 0:
             taken = min(count, most)
-            total = w.run(partial(self._sum_of_samples, seeds, first, taken, limit))
-            yield taken, w.to_numpy(total).reshape(2, height, width, 3)
+            sums = w.run(partial(self._sum_of_samples, seeds, first, taken, limit))
+            w.evaluate(*sums)
+            images = [w.to_numpy(total).reshape(2, height, width, 3) for total in sums]
+            yield Batch(taken, images[0], images[1] if self._emitted is not None else None)
             first, count = first + taken, count - taken
 
     def _sum_of_samples(self, seeds, first: int, count: int, limit):
@@ -129,41 +154,55 @@ class IndirectIrradiance:
         points = w.table(reversed_sobol_points(first, count))
         start, end = (w.table(np.array([number], np.uint32)) for number in (first, count))
         lane = w.lanes(lanes)
-        scrambles = [w.take(seeds, lane * _SEEDS + k) for k in range(_SEEDS)]
+        count_first = self._first_numbers
+        scrambles = [w.take(seeds, lane * (count_first + 1) + k) for k in range(count_first + 1)]
 
-        def add_sample(index, total):
-            pair = [w.take(points, index * 2 + k % 2) for k in range(4)]
-            first_numbers = tuple(owen_scrambled(w, pair[k], scrambles[k]) for k in range(4))
-            stream = (start + index) * (_NUMBERS_PER_VERTEX * (BOUNCE_LIMIT + 1))
-            return index + 1, total + self._arriving(first_numbers, stream, scrambles[4], limit)
+        def add_sample(index, totals):
+            pair = [w.take(points, index * 2 + k % 2) for k in range(count_first)]
+            first_numbers = tuple(owen_scrambled(w, pair[k], scrambles[k]) for k in range(count_first))
+            stream = (start + index) * ((count_first + _OTHER_NUMBERS) * (BOUNCE_LIMIT + 1))
+            arriving = self._arriving(first_numbers, stream, scrambles[-1], limit)
+            return index + 1, tuple(a + b for a, b in zip(totals, arriving, strict=True))
 
-        _, total = w.loop(lambda index, _: index < end, add_sample, (start * 0, w.zero_vectors(lanes)))
-        return total
+        nothing = tuple(w.zero_vectors(lanes) for _ in range(1 if self._emitted is None else 2))
+        return w.loop(lambda index, _: index < end, add_sample, (start * 0, nothing))[1]
 
-    def _arriving(self, first_numbers, stream, seed, limit):
-        """One sample of the indirect irradiance (W/m²) at the pixel centres.
+    def _arriving(self, first_numbers, stream, seed, limit) -> tuple:
+        """One sample of the indirect irradiance (W/m²) at the pixel centres, and, if anything glows, of its
+        direct irradiance.
 
-        The first vertex takes its cosine-weighted direction and its light path from `first_numbers`. All
-        other random numbers are hashed from `stream`.
+        The first vertex takes its cosine-weighted direction, its light path and its light sample from
+        `first_numbers`. All other random numbers are hashed from `stream`.
         """
         w = self._wavefront
+        per_vertex = len(first_numbers) + _OTHER_NUMBERS
 
         def bounce(depth, alive, vertex, numbers, throughput, arriving):
             x = Surface(*vertex)
             chosen, survives, *following = (
-                hashed(w, stream + depth * _NUMBERS_PER_VERTEX + k, seed) for k in range(6)
+                hashed(w, stream + depth * per_vertex + k, seed) for k in range(per_vertex)
             )
-            arriving = arriving + throughput * self._from_light_path(x, alive, chosen, *numbers[2:])
-            y, gathered = self._from_cosine_direction(x, alive, *numbers[:2])
-            alive = alive & y.hit
+            # Light that x reflects is counted up to the limit; what glows also shines on the last vertex.
+            reflects = alive if self._emitted is None else alive & (depth < limit)
+            indirect = arriving[0]
+            indirect = indirect + throughput * self._from_light_path(x, reflects, chosen, *numbers[2:4])
+            y, gathered, direction = self._from_cosine_direction(x, alive, reflects, *numbers[:2])
+            if self._emitted is not None:
+                emitted = self._emitted.from_cosine_direction(x, direction, y, alive)
+                emitted = throughput * (emitted + self._emitted.from_light_sample(x, alive, *numbers[4:]))
+                is_first = depth == 0
+                indirect = indirect + w.where(is_first, 0.0, emitted)
+                arriving = indirect, arriving[1] + w.where(is_first, emitted, 0.0)
+            alive = reflects & y.hit
             throughput = throughput * y.albedo
-            arriving = arriving + w.where(alive, throughput * gathered, 0.0)
+            arriving = (indirect + w.where(alive, throughput * gathered, 0.0), *arriving[1:])
             depth = depth + 1
             largest = w.maximum(w.maximum(throughput[0], throughput[1]), throughput[2])
             survival = w.where(depth < ROULETTE_DEPTH, 1.0, w.minimum(largest, ROULETTE_SURVIVAL))
-            alive = alive & (depth < limit) & (survives < survival)
+            goes_on = depth < limit if self._emitted is None else depth <= limit
+            alive = alive & goes_on & (survives < survival)
             throughput = throughput / w.maximum(survival, 1e-12)
-            return depth, alive, tuple(y), tuple(following), throughput, arriving
+            return depth, alive, tuple(y._replace(glow=())), tuple(following), throughput, arriving
 
         black = self._seen.position * 0.0
         state = (
@@ -172,24 +211,24 @@ class IndirectIrradiance:
             tuple(self._seen),
             first_numbers,
             black + 1.0,
-            black,
+            (black,) if self._emitted is None else (black, black),
         )
         return w.loop(lambda depth, alive, *_: alive, bounce, state)[-1]
 
-    def _from_cosine_direction(self, x: Surface, alive, u, v):
-        """The surface y along a cosine-weighted direction from x, and the direct irradiance at y times the
-        weight of the balance heuristic."""
+    def _from_cosine_direction(self, x: Surface, alive, reflects, u, v):
+        """The surface y along a cosine-weighted direction from x, the punctual lights' irradiance at y times
+        the weight of the balance heuristic where x `reflects` it, and the direction."""
         w = self._wavefront
         direction = cosine_direction(w, x.shading_normal, u, v)
         y = self._surfaces.first_along(x.ray_origin(w, direction), direction, alive)
-        density = _cosine_density(w, x, y)
+        density = cosine_density(w, x, y)
         count = w.to_number(self._lights.count)
 
         def balance(paths):
             # 1e-30 only avoids 0/0: where both densities are zero, no light arrives.
             return density / w.maximum(density + paths / count, 1e-30)
 
-        return y, self._lights.irradiance(y, alive & y.hit, balance)
+        return y, self._lights.irradiance(y, reflects & y.hit, balance), direction
 
     def _from_light_path(self, x: Surface, alive, chosen, u, v):
         """Contribution to x (W/m²) of a path from a random light, times the balance heuristic's weight."""
@@ -200,7 +239,7 @@ class IndirectIrradiance:
         origin, direction = self._lights.emitted(light, u, v)
         y = self._surfaces.first_along(origin, direction, alive)
         _, _, irradiance, paths = self._lights.arriving(light, y)
-        density = _cosine_density(w, x, y)
+        density = cosine_density(w, x, y)
         to_x = x.position - y.position
         facing = (w.dot(y.shading_normal, to_x) > 0.0) & (w.dot(irradiance, irradiance) > 0.0)
         facing = alive & y.hit & facing & (density > 0.0)
@@ -211,17 +250,7 @@ class IndirectIrradiance:
         return w.where(facing & (passing > 0.0), y.albedo * irradiance * scale, 0.0)
 
 
-def _cosine_density(wavefront, x: Surface, y: Surface):
-    """Density per unit area at y of cosine-weighted directions from x: max(0, cos θ_x)·|cos θ_y|/(π·d²)."""
-    w = wavefront
-    to_y = y.position - x.position
-    squared = w.maximum(w.dot(to_y, to_y), 1e-20)
-    slant = w.dot(y.geometric_normal, to_y)
-    cosines = w.maximum(w.dot(x.shading_normal, to_y), 0.0) * w.maximum(slant, -slant)
-    return cosines / (squared * squared * math.pi)
-
-
-def _pixel_seeds(seed: int, half: int, pixels: int) -> UInt32[np.ndarray, "pixels 5"]:
-    """For each pixel, four scrambles for the numbers of the first vertex and one seed for all others."""
+def _pixel_seeds(seed: int, half: int, pixels: int, count: int) -> UInt32[np.ndarray, "pixels count"]:
+    """For each pixel, scrambles for the numbers of the first vertex and, last, one seed for all others."""
     rng = np.random.default_rng([seed, half])
-    return rng.integers(0, 2**32, (pixels, _SEEDS), dtype=np.uint32)
+    return rng.integers(0, 2**32, (pixels, count), dtype=np.uint32)

@@ -115,6 +115,7 @@ class LlvmWavefront:
     floor = staticmethod(dr.floor)
     sin = staticmethod(dr.sin)
     cos = staticmethod(dr.cos)
+    atan2 = staticmethod(dr.atan2)
 
 
 def mitsuba_scene(triangles: UnitTriangles, floats: type, uints: type) -> Any:

@@ -137,6 +137,7 @@ class NumpyWavefront:
     floor = staticmethod(np.floor)
     sin = staticmethod(np.sin)
     cos = staticmethod(np.cos)
+    atan2 = staticmethod(np.arctan2)
 
 
 def _advanced(going, new, old):

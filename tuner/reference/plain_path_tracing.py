@@ -13,10 +13,10 @@ from vpltune.tuner.reference.surfaces import Surface
 class PlainPathTracing(IndirectIrradiance):
     """As `IndirectIrradiance`, by cosine-weighted directions and shadow rays alone."""
 
-    def _from_cosine_direction(self, x: Surface, alive, u, v):
+    def _from_cosine_direction(self, x: Surface, alive, reflects, u, v):
         direction = cosine_direction(self._wavefront, x.shading_normal, u, v)
         y = self._surfaces.first_along(x.ray_origin(self._wavefront, direction), direction, alive)
-        return y, self._lights.irradiance(y, alive & y.hit)
+        return y, self._lights.irradiance(y, reflects & y.hit), direction
 
     def _from_light_path(self, x: Surface, alive, chosen, u, v):
         return x.position * 0.0

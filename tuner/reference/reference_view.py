@@ -17,7 +17,8 @@ class ReferenceView:
     """Indirect irradiance. The two halves, a and b, are independent unbiased estimates of it."""
     irradiance_b: Float32[np.ndarray, "height width 3"]
     direct_irradiance: Float32[np.ndarray, "height width 3"]
-    """Free of noise, since punctual lights cast hard shadows."""
+    """Light that no surface has reflected, from punctual lights, glowing surfaces and the environment.
+    Punctual lights cast hard shadows and add no noise; for the others it is the mean of two halves."""
     albedo: Float32[np.ndarray, "height width 3"]
     position_world: Float64[np.ndarray, "height width 3"]
     normal_world: Float32[np.ndarray, "height width 3"]
@@ -26,6 +27,11 @@ class ReferenceView:
     """Whether the pixel centre sees a surface."""
     samples: int
     """Samples per pixel in each half."""
+    direct_noise_floor: float = 0.0
+    """The relMSE that the noise of `direct_irradiance` alone causes; 0 if nothing glows."""
+    emission: Float32[np.ndarray, "height width 3"] | None = None
+    """Radiance that the pixel centre sees of the surface or, where it sees none, of the environment, in
+    W/(m² sr). It is no irradiance and in none of the images above. None if nothing glows."""
 
     @property
     def irradiance(self) -> Float32[np.ndarray, "height width 3"]:
@@ -34,13 +40,19 @@ class ReferenceView:
 
 
 def noise_floor(reference: ReferenceView) -> float:
-    """The relMSE that the noise of this reference alone causes; 0 if no pixel is valid or lit.
+    """The relMSE that the noise of this reference's indirect light alone causes; 0 if no pixel is valid or
+    lit."""
+    valid = reference.valid
+    return noise_between(reference.irradiance_a[valid], reference.irradiance_b[valid])
 
-    relMSE is mean((y − r)²/(r² + 0.01·mean(r)²)) over valid pixels and channels. With r = (A + B)/2 and
-    independent halves, ((A − B)/2)² has the variance of r as its expectation, so it replaces (y − r)².
+
+def noise_between(a: Float32[np.ndarray, "n 3"], b: Float32[np.ndarray, "n 3"]) -> float:
+    """The relMSE that noise causes in the mean of two halves; 0 if nothing is lit.
+
+    relMSE is mean((y − r)²/(r² + 0.01·mean(r)²)) over pixels and channels. With r = (A + B)/2 and independent
+    halves, ((A − B)/2)² has the variance of r as its expectation, so it replaces (y − r)².
     """
-    a = reference.irradiance_a[reference.valid].astype(np.float64)
-    b = reference.irradiance_b[reference.valid].astype(np.float64)
+    a, b = a.astype(np.float64), b.astype(np.float64)
     mean = (a + b) / 2.0
     if not mean.any():
         return 0.0

@@ -8,7 +8,7 @@ from vpltune.renderer.scene.scene import Scene
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.reference import cache
 from vpltune.tuner.reference.content_key import reference_key, scene_digest
-from vpltune.tuner.reference.reference_view import ReferenceView, noise_floor
+from vpltune.tuner.reference.reference_view import ReferenceView, noise_between, noise_floor
 from vpltune.tuner.reference.variant import describe_variant
 
 FIRST_ROUND = 64
@@ -31,16 +31,18 @@ def reference_views(
     """The reference of each view. Equal arguments, variant and versions give bit-identical results.
 
     Args:
-        scene: Geometry and materials. Its lights and cameras are ignored; each view brings its own.
+        scene: Geometry, materials and environment. Its lights and cameras are ignored; each view brings its
+            own.
         views: Cameras, lights and image sizes to render.
         seed: Seed of the randomisation of both halves, ≥ 0.
-        noise_target: Sampling stops once `noise_floor` is at most this, ≥ 0.
+        noise_target: Sampling stops once `noise_floor`, and that of direct light, are at most this, ≥ 0.
         max_samples: Upper limit on samples per pixel in each half, ≥ 1.
         bounces: Reflections before light arrives at a receiver, ≥ 1; None for unlimited.
         progress: Called with the view's name and the share of the total work done, in [0, 1].
 
     Raises:
-        InputError: the scene has no triangles, or an index in it is out of range.
+        InputError: the scene has no triangles, an index in it is out of range, or a radiance is negative or
+            not finite.
         ValueError: an argument is out of range.
     """
     if max_samples < 1 or not noise_target >= 0.0 or (bounces is not None and bounces < 1) or seed < 0:
@@ -93,27 +95,31 @@ def _rendered(
     from vpltune.tuner.reference.traced_scene import traced_scene
 
     traced = traced_scene(scene)
-    estimator = IndirectIrradiance(traced.wavefront, traced.surfaces, traced.triangles, view)
+    estimator = IndirectIrradiance(traced, view)
     hits = estimator.primary_hits
-    total = np.zeros((2, *hits.albedo.shape))
+    total, emitted = np.zeros((2, 2, *hits.albedo.shape))
     done, goal, needed = 0, min(FIRST_ROUND, max_samples), max_samples
     while True:
-        for taken, batch in estimator.batches(done, goal - done, seed, bounces):
-            total += batch
-            done += taken
+        for batch in estimator.batches(done, goal - done, seed, bounces):
+            total += batch.irradiance
+            emitted += 0.0 if batch.emitted is None else batch.emitted
+            done += batch.samples
             report(min(1.0, done / needed))
         half_a, half_b = (total / done).astype(np.float32)
+        direct = hits.direct_irradiance + (emitted / done).astype(np.float32)
         reference = ReferenceView(
             irradiance_a=half_a,
             irradiance_b=half_b,
-            direct_irradiance=hits.direct_irradiance,
+            direct_irradiance=direct.mean(axis=0),
             albedo=hits.albedo,
             position_world=hits.position_world,
             normal_world=hits.normal_world,
             valid=hits.valid,
             samples=done,
+            direct_noise_floor=noise_between(*direct[:, hits.valid]),
+            emission=hits.emission,
         )
-        floor = noise_floor(reference)
+        floor = max(noise_floor(reference), reference.direct_noise_floor)
         if floor <= noise_target or done >= max_samples:
             return reference
         # The variance falls at least as fast as 1/samples.

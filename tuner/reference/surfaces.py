@@ -1,5 +1,6 @@
 """Surface points: position, normals and albedo where a ray hits the scene's triangles."""
 
+import math
 from typing import Any, NamedTuple
 
 from vpltune.tuner.reference.sobol import hashed
@@ -24,11 +25,23 @@ class Surface(NamedTuple):
     geometric_normal: Any
     """Unit length, oriented by the winding of the triangle."""
     albedo: Any
+    glow: Any = ()
+    """(radiance that the ray meets, RGB in W/(m² sr); index of the triangle); empty if nothing glows."""
 
     def ray_origin(self, wavefront, direction):
         """Origin for a ray that leaves along `direction`: `OFFSET` off the surface, on that side."""
         side = wavefront.dot(self.geometric_normal, direction)
         return self.position + self.geometric_normal * wavefront.where(side > 0.0, OFFSET, -OFFSET)
+
+
+def cosine_density(wavefront, x: Surface, y: Surface):
+    """Density per unit area at y of cosine-weighted directions from x: max(0, cos θ_x)·|cos θ_y|/(π·d²)."""
+    w = wavefront
+    to_y = y.position - x.position
+    squared = w.maximum(w.dot(to_y, to_y), 1e-20)
+    slant = w.dot(y.geometric_normal, to_y)
+    cosines = w.maximum(w.dot(x.shading_normal, to_y), 0.0) * w.maximum(slant, -slant)
+    return cosines / (squared * squared * math.pi)
 
 
 class Surfaces:
@@ -50,6 +63,11 @@ class Surfaces:
         self._has_holes = triangles.has_holes
         self._alpha_rows = wavefront.table(triangles.triangle_alphas)
         self._alphas = wavefront.table(triangles.alphas)
+        self._glows = triangles.glows
+        self._glow_textured = bool(triangles.emission_textures.any())
+        self._emission_rows = wavefront.table(triangles.triangle_emissions)
+        self._emissions = wavefront.table(triangles.emissions)
+        self._emission_textures = wavefront.table(triangles.emission_textures)
 
     def first_along(self, origin, direction, active, *, seen: bool = False) -> Surface:
         """The first surface along each active ray, with position and `origin` in unit space.
@@ -61,6 +79,12 @@ class Surfaces:
             hit, triangle, b1, b2 = self._first_beyond_holes(origin, direction, active, seen)
         else:
             hit, triangle, b1, b2 = w.closest_hit(origin, direction, active)
+        return self.at(hit, triangle, b1, b2, direction)
+
+    def at(self, hit, triangle, b1, b2, direction) -> Surface:
+        """The surface at barycentric coordinates of a triangle, met by a ray along `direction`, of any
+        length."""
+        w = self.wavefront
         b0 = 1.0 - b1 - b2
         corners = w.take_vector(self._corners, triangle)
 
@@ -79,7 +103,32 @@ class Surfaces:
             u = self._interpolated_uv(corners, 0, b0, b1, b2)
             v = self._interpolated_uv(corners, 1, b0, b1, b2)
             albedo = albedo * self._texture(w.take(self._texture_rows, triangle), u, v)
-        return Surface(hit, interpolated(self._positions), normal, geometric, albedo)
+        glow = ()
+        if self._glows:
+            glow = (self._emitted(triangle, corners, b1, b2, geometric, direction), triangle)
+        return Surface(hit, interpolated(self._positions), normal, geometric, albedo, glow)
+
+    def position(self, triangle, b1, b2):
+        """The point at barycentric coordinates of a triangle."""
+        corners = self.wavefront.take_vector(self._corners, triangle)
+        return self._interpolated(self._positions, corners, 1.0 - b1 - b2, b1, b2)
+
+    def stopped(self, triangle, b1, b2):
+        """Share of the light in [0, 1] that the surface stops at a point: 0 in a hole."""
+        return self._stopped(triangle, b1, b2)[0] if self._has_holes else 1.0
+
+    def _emitted(self, triangle, corners, b1, b2, geometric, direction):
+        """Radiance that a ray along `direction` meets."""
+        w = self.wavefront
+        row = w.take(self._emission_rows, triangle)
+        red, green, blue, side = (w.take(self._emissions, row * 4 + k) for k in range(4))
+        # Negative where the ray runs against the normal of the side that glows.
+        facing = (side == 0.0) | (side * w.dot(geometric, direction) < 0.0)
+        radiance = w.where(facing, w.vector(red, green, blue), 0.0)
+        if not self._glow_textured:
+            return radiance
+        u, v = (self._interpolated_uv(corners, axis, 1.0 - b1 - b2, b1, b2) for axis in range(2))
+        return radiance * self._texture(w.take(self._emission_textures, row), u, v)
 
     def passing(self, origin, direction, max_t, active):
         """Share of the light in [0, 1] that comes through along each active ray; undefined for the others.
@@ -153,8 +202,7 @@ class Surfaces:
     def _behind(self, triangle, b1, b2, direction):
         """The start of a ray that goes on through a surface: `OFFSET` beyond it."""
         w = self.wavefront
-        corners = w.take_vector(self._corners, triangle)
-        position = self._interpolated(self._positions, corners, 1.0 - b1 - b2, b1, b2)
+        position = self.position(triangle, b1, b2)
         normal = w.take_vector(self._geometric_normals, triangle)
         return position + normal * w.where(w.dot(normal, direction) > 0.0, OFFSET, -OFFSET)
 

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Float64, Int64, UInt32
 
 from vpltune.renderer.errors import InputError
-from vpltune.renderer.scene.scene import Light, Mesh, Scene
+from vpltune.renderer.scene.scene import Instance, Light, Mesh, Scene
 from vpltune.renderer.scene.transforms import transform_normals, transform_points
 
 WRAP_MODES = ("repeat", "mirrored_repeat", "clamp_to_edge")
@@ -44,6 +44,18 @@ class UnitTriangles:
     """Row of `alphas`. Row 0 is that of opaque materials."""
     alphas: Float32[np.ndarray, "materials 3"]
     """Opacity, cutoff, and 1 if blended."""
+    triangle_emissions: UInt32[np.ndarray, " triangles"]
+    """Row of `emissions`. Row 0 is that of materials that do not glow."""
+    emissions: Float32[np.ndarray, "emissions 4"]
+    """Radiance in W/(m² sr), RGB, and the side that glows: 1 where `geometric_normals` point, −1 the other, 0
+    both."""
+    emission_textures: UInt32[np.ndarray, " emissions"]
+    """Row of `textures`, a factor of the emission."""
+
+    @property
+    def glows(self) -> bool:
+        """Whether a surface emits light of its own."""
+        return len(self.emissions) > 1
 
     @property
     def has_holes(self) -> bool:
@@ -97,8 +109,9 @@ def unit_triangles(scene: Scene) -> UnitTriangles:
         ]
     )
     sizes = [len(mesh.triangles) for mesh in meshes]
-    texture_of = [_texture_row(scene, mesh) for mesh in meshes]
+    texture_of = [_texture_row(scene.materials[mesh.material].texture) for mesh in meshes]
     alpha_of, alphas = _alphas(scene, meshes)
+    emission_of, emissions, emission_textures = _emissions(scene, placed)
     textures, texels = _packed_textures(scene)
     return UnitTriangles(
         center_world=center,
@@ -116,6 +129,9 @@ def unit_triangles(scene: Scene) -> UnitTriangles:
         texels=texels,
         triangle_alphas=np.repeat(alpha_of, sizes).astype(np.uint32),
         alphas=alphas,
+        triangle_emissions=np.repeat(emission_of, sizes).astype(np.uint32),
+        emissions=emissions,
+        emission_textures=emission_textures,
     )
 
 
@@ -128,16 +144,18 @@ def _check_mesh(scene: Scene, mesh: Mesh) -> None:
         )
     if not 0 <= mesh.material < len(scene.materials):
         raise InputError(f"{where}: material must lie in [0, {len(scene.materials)}), got {mesh.material}")
-    texture = scene.materials[mesh.material].texture
-    if texture is not None and not 0 <= texture < len(scene.textures):
-        raise InputError(f"{where}: texture must lie in [0, {len(scene.textures)}), got {texture}")
+    material = scene.materials[mesh.material]
+    for name, texture in (("texture", material.texture), ("emission_texture", material.emission_texture)):
+        if texture is not None and not 0 <= texture < len(scene.textures):
+            raise InputError(f"{where}: {name} must lie in [0, {len(scene.textures)}), got {texture}")
+    if not all(0.0 <= value < np.inf for value in material.emission):
+        raise InputError(f"{where}: emission must be finite and at least 0, got {material.emission}")
     for attribute in ("positions", "normals", "uv", "colors"):
         if not np.isfinite(getattr(mesh, attribute)).all():
             raise InputError(f"{where}: {attribute} must be finite")
 
 
-def _texture_row(scene: Scene, mesh: Mesh) -> int:
-    texture = scene.materials[mesh.material].texture
+def _texture_row(texture: int | None) -> int:
     return 0 if texture is None else texture + 1
 
 
@@ -148,6 +166,30 @@ def _alphas(scene: Scene, meshes: list[Mesh]) -> tuple[list[int], Float32[np.nda
     rows = [(1.0, 0.0, 0.0), *((each.opacity, each.alpha_cutoff, each.is_blended) for each in others)]
     row_of = {material: row for row, material in enumerate(used, start=1)}
     return [row_of.get(mesh.material, 0) for mesh in meshes], np.array(rows, np.float32)
+
+
+def _emissions(
+    scene: Scene, placed: list[Instance]
+) -> tuple[list[int], Float32[np.ndarray, "emissions 4"], UInt32[np.ndarray, " emissions"]]:
+    """The row of each instance, and the rows: one for all that is dark, then one for each material and side.
+
+    glTF 2.0, section 3.7.4: where a transform has a negative determinant, the front is where the transformed
+    triangles wind clockwise.
+    """
+    row_of: list[int] = []
+    rows: dict[tuple[int, float], int] = {}
+    emissions, textures = [(0.0, 0.0, 0.0, 0.0)], [0]
+    for instance in placed:
+        index = scene.meshes[instance.mesh].material
+        material = scene.materials[index]
+        mirrored = np.linalg.det(instance.to_world[:3, :3]) < 0.0
+        side = 0.0 if material.emits_both_ways else -1.0 if mirrored else 1.0
+        if material.glows and (index, side) not in rows:
+            rows[index, side] = len(emissions)
+            emissions.append((*material.emission, side))
+            textures.append(_texture_row(material.emission_texture))
+        row_of.append(rows.get((index, side), 0))
+    return row_of, np.array(emissions, np.float32), np.array(textures, np.uint32)
 
 
 def _packed_textures(

@@ -21,10 +21,10 @@ def test_the_mean_is_the_reference_s_and_the_noise_is_more(shapes):
     traced = traced_scene(shapes.box_room())
     means, variances = [], []
     for estimator in (PlainPathTracing, IndirectIrradiance):
-        tracer = estimator(traced.wavefront, traced.surfaces, traced.triangles, view)
+        tracer = estimator(traced, view)
         halves = np.array(
             [
-                sum(batch for _, batch in tracer.batches(0, SAMPLES, seed, 1)) / SAMPLES
+                sum(batch.irradiance for batch in tracer.batches(0, SAMPLES, seed, 1)) / SAMPLES
                 for seed in range(SEEDS)
             ]
         )

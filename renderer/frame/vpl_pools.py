@@ -8,7 +8,8 @@ VPL_BYTES = 48
 """Bytes of a VPL: `shaders/common/virtual_point_lights.glsl`."""
 LATER_SHARE = 0.5
 """VPLs of light that was reflected more than once, or came from glowing surfaces, for each VPL of light that
-was reflected once and came from lamps or sky. A choice."""
+was reflected once and came from lamps or sky. A choice of 0.25, 0.5 and 1: in eight generated rooms the mean
+relMSE is 0.020, 0.011 and 0.008; a frame takes about as many times longer as there are VPLs."""
 GLOWING_SHARE = 0.5
 """VPLs on glowing surfaces for each of the first kind. A choice."""
 

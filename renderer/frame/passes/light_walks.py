@@ -11,8 +11,8 @@ from vpltune.renderer.gpu.ray_hierarchy import RayHierarchy
 from vpltune.renderer.gpu.resources import Resources
 
 WALKS = 4096
-"""Walks of a frame. A choice of 2,048, 4,096 and 8,192: in eight generated rooms the mean relMSE is 0.016, 0.011 and
-0.013 (docs/design_decisions.md, All the light)."""
+"""Walks of a frame. A choice of 2,048, 4,096 and 8,192: in eight generated rooms the mean relMSE is 0.016,
+0.011 and 0.013 (docs/design_decisions.md, All the light)."""
 STEPS_OF_ALL = 8
 """Reflections that a walk records where it stands for all of them; the last stands for the rest. A choice: at
 an albedo of 0.5, one part in 256 is left for it."""

@@ -190,7 +190,7 @@ def test_punctual_lights_come_over_as_they_are(tmp_path):
     [
         '<rotate y="1" angle="37"/>',
         '<rotate x="1" angle="90"/><rotate z="1" angle="20"/>',
-        '<rotate x="1" y="1" z="-2" angle="200"/>',
+        '<rotate x="0.36" y="0.48" z="-0.8" angle="200"/>',
     ],
     ids=["y", "upright", "any"],
 )

@@ -70,13 +70,11 @@ def save_sidecar(path: Path, camera: Camera, lights: tuple[PlacedLight, ...]) ->
     """Write camera and lights as a scene's sidecar, which keeps its sky; returns one line.
 
     Raises:
-        InputError: there is no light, which a window does not save; or the sidecar that is there is invalid.
+        InputError: it is no sidecar's name, or the sidecar that is there is invalid.
         MachineError: the file cannot be written.
     """
     if not path.name.endswith(".vpltune.toml"):
         raise InputError(f"{path}: a sidecar's name ends in .vpltune.toml")
-    if not lights:
-        raise InputError("save: a sidecar holds at least one light")
     sky = read_sidecar(path).sky if path.is_file() else None
     write_text_whole(path, sidecar_text(camera, [each.light for each in lights], sky))
     return f"wrote {path} (camera, {_counted(len(lights), 'light')})"

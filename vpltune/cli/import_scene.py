@@ -78,6 +78,6 @@ def _write_environment(environment: "Environment", output: Path) -> str:
     there = sidecar_of(output)
     image = output.with_suffix(ENVIRONMENT_SUFFIX)
     write_exr(image, environment.radiance)
-    text = sidecar_text(there.camera, there.lights or (), GivenSky(file=image.name))
+    text = sidecar_text(there.camera, there.lights, GivenSky(file=image.name))
     write_text_whole(sidecar_path(output), text)
     return str(image)

@@ -1,5 +1,6 @@
 """`vpltune init`: writes a scene's sidecar with the camera and the lights that would be used."""
 
+from contextlib import suppress
 from typing import Annotated
 
 import typer
@@ -29,11 +30,14 @@ def init(
     path = sidecar_path(scene)
     if path.exists() and not force:
         raise InputError(f"{path}: exists already; --force replaces it")
-    # A new sidecar keeps the sky of the one that it replaces.
-    sky = sidecar_of(scene).sky
     loaded = read_scene(scene)
     warn(loaded.warnings)
-    loaded = with_environment(loaded, scene)
+    sky = None
+    # A new sidecar keeps the sky of the one that it replaces, unless that one cannot be read.
+    with suppress(InputError):
+        sky = sidecar_of(scene).sky
+    if sky is not None:
+        loaded = with_environment(loaded, scene)
     camera, lights, notes = completed_camera_and_lights(loaded, scene, None, None)
     warn(notes)
     if abs(camera.to_world[1, 0]) > LEAST_ROLL:

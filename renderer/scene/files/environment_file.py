@@ -11,7 +11,7 @@ from vpltune.renderer.scene.files.limits import LARGEST_RADIOMETRIC
 from vpltune.renderer.scene.files.radiance_hdr import hdr_pixels
 
 ENVIRONMENT_SUFFIXES = (".exr", ".hdr")
-"""Of the files that are read."""
+"""Suffixes of the maps that are read."""
 
 
 def is_environment_file(name: str) -> bool:

@@ -90,15 +90,18 @@ def _alike(one: str, other: str) -> bool:
     return difflib.SequenceMatcher(None, one, other).ratio() >= _ALIKE
 
 
-def sidecar_text(camera: Camera | None, lights: Sequence[Light], sky: GivenSky | None = None) -> str:
+def sidecar_text(camera: Camera | None, lights: Sequence[Light] | None, sky: GivenSky | None = None) -> str:
     """A sidecar with these.
 
     Args:
         camera: a roll about its view axis is lost, since a sidecar's camera has +Y up. None to write none.
-        lights: empty to write none; the scene's own, or an automatic one, are used then.
+        lights: empty for a scene that is to have none. None to write none; the scene's own, or an automatic
+            one, are used then.
         sky: None to write none.
     """
     parts = ["# Lengths in world units, angles in degrees. What is left out is chosen by VPLtune."]
+    if lights is not None and not lights:
+        parts += ["light = []  # no lights; take this line out to add [[light]] tables", ""]
     if camera is not None:
         eye = camera.position_world
         # A target about as far away as the origin keeps its digits.
@@ -109,7 +112,7 @@ def sidecar_text(camera: Camera | None, lights: Sequence[Light], sky: GivenSky |
             f"look_at = {_numbers(target)}",
             f"yfov_degrees = {_number(math.degrees(camera.yfov))}",
         ]
-    for light in lights:
+    for light in lights or ():
         unit = "W/m²" if light.kind == "directional" else "W/sr"
         parts += ["", "[[light]]", f'type = "{light.kind}"']
         if light.kind != "directional":

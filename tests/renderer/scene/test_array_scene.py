@@ -121,7 +121,6 @@ BROKEN = {
     "emission: must be from 0 to 1e+18, got nan": {"emission": [0.0, np.nan, 1.0]},
     "emission: must be from 0 to 1e+18, got 1e+30": {"emission": 1e30},
     "emission: must be one number or RGB, got [2]": {"emission": [1.0, 1.0]},
-    "environment: must be an Environment, got int": {"environment": 3},
     "environment: radiance must be from 0 to 1e+18, got -1 to 1": {
         "environment": even_sky((1.0, -1.0, 1.0)),
     },

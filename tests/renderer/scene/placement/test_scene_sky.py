@@ -14,7 +14,7 @@ from vpltune.renderer.scene.placement.given_sky import GivenSky
 from vpltune.renderer.scene.placement.own_light import has_own_light
 from vpltune.renderer.scene.placement.scene_sidecar import read_sidecar
 from vpltune.renderer.scene.placement.sidecar_file import sidecar_text
-from vpltune.renderer.scene.scene import Scene, Texture
+from vpltune.renderer.scene.scene import Camera, Scene, Texture
 
 
 def room() -> Scene:
@@ -103,10 +103,14 @@ def test_radiance_of_a_map_is_bounded(tmp_path, value):
 )
 def test_a_written_sky_reads_back(tmp_path, sky):
     path = tmp_path / "room.vpltune.toml"
-    path.write_text(sidecar_text(None, (), sky), encoding="utf-8")
+    path.write_text(sidecar_text(None, None, sky), encoding="utf-8")
     read = read_sidecar(path)
     assert read.sky == sky
     assert (read.camera, read.lights) == (None, None)
+    path.write_text(sidecar_text(Camera(np.eye(4), 1.0), (), sky), encoding="utf-8")
+    again = read_sidecar(path)
+    assert (again.sky, again.lights) == (sky, ())
+    assert again.camera is not None
 
 
 @pytest.mark.parametrize(

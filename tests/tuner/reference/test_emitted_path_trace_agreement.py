@@ -68,7 +68,8 @@ def test_box_room(mitsuba, shapes, kind, bounces):
     depth = DEPTH_OF_ALL if bounces is None else bounces + 2
     for right, wanted in ((2, direct), (depth, whole)):
         plain, variance = (
-            image[valid] for image in shapes.plain_path_trace(mitsuba, scene, view, right, samples, right, sky)
+            image[valid]
+            for image in shapes.plain_path_trace(mitsuba, scene, view, right, samples, right, sky)
         )
         # As in test_path_trace_agreement: our own noise, over the image, and a floor for dark pixels.
         variance = variance * (1.0 + own.sum() / variance.sum()) + (1e-3 * wanted.mean()) ** 2

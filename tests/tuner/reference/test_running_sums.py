@@ -25,7 +25,7 @@ def test_entries_come_as_often_as_their_weights(wavefront, count):
         entry, place = drawn(wavefront, sums.ravel(), first, sums.shape[1], u)
         found = np.bincount(entry, minlength=count) / u.size
         np.testing.assert_allclose(found, shares[row], atol=2.0**-15)
-        assert 0.0 <= place.min() and place.max() < 1.0
+        assert place.min() >= 0.0 and place.max() < 1.0
         assert place[entry == shares[row].argmax()].mean() == pytest.approx(0.5, abs=0.01)
 
 

@@ -43,6 +43,15 @@ def _outside_folder(variable: str, name: str) -> Path:
 
 
 @pytest.fixture(scope="session")
+def playwright():
+    """The one driver of browsers of this process: its event loop runs while it lives, and bars a second."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        yield driver
+
+
+@pytest.fixture(scope="session")
 def gl_context():
     """One OpenGL context for the whole run: making one for each test takes longer than the tests."""
     from vpltune.renderer.gpu.gpu_context import create_context

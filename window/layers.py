@@ -5,8 +5,9 @@ from jaxtyping import UInt8
 
 from vpltune.renderer.frame.capture import CapturedFrame, read_image
 from vpltune.renderer.frame.clip_state import ClipState
+from vpltune.renderer.frame.drawn_frame import DrawnFrame
 from vpltune.renderer.frame.layer_display import for_display
-from vpltune.renderer.frame.runtime import DrawnFrame, Runtime
+from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.gpu.gpu_context import check_errors
 from vpltune.renderer.scene.scene import Camera
 from vpltune.renderer.scene.views import View

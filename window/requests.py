@@ -6,6 +6,7 @@ from typing import Any
 
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.placement import with_environment
 from vpltune.renderer.scene.scene import Camera, Light, Scene
 from vpltune.renderer.scene.views import View
 from vpltune.window.document import NamedView, PlacedLight
@@ -32,7 +33,7 @@ class SceneSource:
         if self.scene is not None:
             return self.scene
         assert self.path is not None, "a source has a file or a scene"
-        return read_scene(self.path)
+        return with_environment(read_scene(self.path), self.path)
 
     @property
     def name(self) -> str:

@@ -10,6 +10,7 @@ from vpltune.renderer.config.tuned_config import TunedConfig, config_text, parse
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole, written_together
 from vpltune.renderer.files.image_file import require_extension
+from vpltune.renderer.scene.placement.scene_sidecar import read_sidecar
 from vpltune.renderer.scene.placement.sidecar_file import sidecar_path, sidecar_text
 from vpltune.renderer.scene.scene import Camera
 from vpltune.renderer.scene.views import (
@@ -66,17 +67,16 @@ def save_config(path: Path, config: TunedConfig, fit_folder: Path | None) -> str
 
 
 def save_sidecar(path: Path, camera: Camera, lights: tuple[PlacedLight, ...]) -> str:
-    """Write camera and lights as a scene's sidecar; returns one line.
+    """Write camera and lights as a scene's sidecar, which keeps its sky; returns one line.
 
     Raises:
-        InputError: there is no light, which a sidecar cannot say.
+        InputError: it is no sidecar's name, or the sidecar that is there is invalid.
         MachineError: the file cannot be written.
     """
     if not path.name.endswith(".vpltune.toml"):
         raise InputError(f"{path}: a sidecar's name ends in .vpltune.toml")
-    if not lights:
-        raise InputError("save: a sidecar holds at least one light")
-    write_text_whole(path, sidecar_text(camera, [each.light for each in lights]))
+    sky = read_sidecar(path).sky if path.is_file() else None
+    write_text_whole(path, sidecar_text(camera, [each.light for each in lights], sky))
     return f"wrote {path} (camera, {_counted(len(lights), 'light')})"
 
 

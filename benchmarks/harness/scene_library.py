@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.placement import resolve_camera_and_lights
+from vpltune.renderer.scene.placement import resolve_camera_and_lights, with_environment
 from vpltune.renderer.scene.scene import Scene
 from vpltune.renderer.scene.views import View
 
@@ -57,6 +57,6 @@ def present_scenes() -> dict[str, Path]:
 
 def scene_and_view(path: Path, size: tuple[int, int]) -> tuple[Scene, View]:
     """Read a scene, and make a view of its own camera and lights, or of placed ones where it has none."""
-    scene = read_scene(path)
+    scene = with_environment(read_scene(path), path)
     camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
     return scene, View(path.stem, "fitted", size, camera, lights)

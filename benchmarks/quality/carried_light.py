@@ -18,7 +18,8 @@ from vpltune.renderer.files.image_file import write_png
 from vpltune.renderer.files.video_file import clip_writer
 from vpltune.renderer.frame.capture import read_image
 from vpltune.renderer.frame.clip_state import ClipState
-from vpltune.renderer.frame.runtime import DrawnFrame, Runtime
+from vpltune.renderer.frame.drawn_frame import DrawnFrame
+from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.scene import Camera, Light, Scene
 from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View

@@ -16,8 +16,8 @@ import numpy as np
 from benchmarks.harness.machine_rates import MachineRates
 from benchmarks.speed.surrogate import FLOPS_PER_PAIR
 from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.drawn_frame import DrawnFrame
 from vpltune.renderer.frame.frame_timing import PassClock
-from vpltune.renderer.frame.runtime import DrawnFrame
 from vpltune.renderer.gpu.resources import Access, Resource, Resources
 
 DISC_OPERATIONS = 170.0
@@ -68,8 +68,8 @@ def pass_operations(drawn: DrawnFrame, config: TunedConfig, triangles: int) -> d
         pair += LOOKUP_OPERATIONS
     ray = BOX_OPERATIONS * math.log2(max(2, triangles)) + TRIANGLE_OPERATIONS
     operations = {
-        "vpl_gather": pixels * setup.vpl_count / setup.interleave**2 * pair,
-        "vpl_visibility_maps": float(setup.vpl_count * setup.maps.size**2) * ray,
+        "vpl_gather": pixels * setup.pools.total / setup.interleave**2 * pair,
+        "vpl_visibility_maps": float(setup.pools.total * setup.maps.size**2) * ray,
     }
     lights = drawn.inputs.dynamic_lights
     if lights is not None:

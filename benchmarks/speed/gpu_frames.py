@@ -12,8 +12,9 @@ from benchmarks.speed.frame_limits import pass_limits
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import VISIBILITIES, TunedConfig
+from vpltune.renderer.frame.drawn_frame import DrawnFrame
 from vpltune.renderer.frame.frame_timing import PassClock, frame_milliseconds
-from vpltune.renderer.frame.runtime import DrawnFrame, Runtime
+from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
 from vpltune.renderer.scene.scene import Scene
 from vpltune.renderer.scene.views import View

@@ -15,7 +15,8 @@ import numpy as np
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import CapturedFrame, read_image
-from vpltune.renderer.frame.runtime import DrawnFrame, Runtime
+from vpltune.renderer.frame.drawn_frame import DrawnFrame
+from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.fitting.fit_density import Rotation, view_rotations
 from vpltune.tuner.fitting.search_space import FALLOFF_SPECS, VISIBILITY_SPECS, SearchSpace

@@ -4,6 +4,7 @@ from typing import Any
 
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ParameterSpec
 from vpltune.renderer.config.auto_prior import auto_schema
+from vpltune.renderer.config.light_settings import light_schema
 from vpltune.renderer.config.quality import quality_schema
 from vpltune.renderer.config.tuned_config import (
     DEFAULT_VISIBILITY,
@@ -41,7 +42,7 @@ def config_schema() -> dict[str, Any]:
                 "properties": specs,
             },
             "auto": auto_schema(),
-            "light": {"description": "Reserved for the scene's light; not acted on.", "type": "object"},
+            "light": light_schema(),
             "fit": {
                 "description": "How the fit that wrote the file ended.",
                 "type": "object",

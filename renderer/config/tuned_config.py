@@ -10,7 +10,7 @@
 | `visibility` | what occludes VPLs: `maps`, or `transmittance` alone; optional, `maps` by default |
 | `auto` | a learnt prior that sets some parameters in every frame (`renderer.config.auto_prior`); optional |
 | `fit` | how the fit that wrote the file ended; optional |
-| `light` | reserved for settings of the scene's light; kept and not acted on; optional |
+| `light` | which of the scene's light is drawn: `bounces`, 1 to 64 or "all"; optional |
 | `provenance` | where the numbers come from; kept and not acted on; optional |
 | `checksum` | SHA-256 of all the rest; optional, but a wrong one is refused |
 
@@ -19,7 +19,6 @@ Version 1 is read too (`renderer.config.config_versions`).
 
 import hashlib
 import json
-import math
 import shlex
 import sys
 from collections.abc import Mapping
@@ -32,6 +31,7 @@ from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistP
 from vpltune.renderer.config.auto_prior import AutoPrior
 from vpltune.renderer.config.config_versions import brought_forward
 from vpltune.renderer.config.gltf_extras import GLTF_SUFFIXES, read_gltf_extras
+from vpltune.renderer.config.light_settings import LightSettings
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
@@ -47,8 +47,6 @@ PRESETS = (DEFAULT_CONFIG_NAME, AUTO_CONFIG_NAME)
 # A real file is about 1 kB; the bound keeps a wrong path (a scene, a device) from being read whole.
 MAXIMUM_FILE_BYTES = 1 << 20
 LARGEST_NUMBER = sys.float_info.max
-DEEPEST_LIGHT = 32
-"""Levels of the reserved key `light`: more than any settings have, and few enough to write again."""
 KEYS = (
     "format",
     "version",
@@ -94,8 +92,7 @@ class TunedConfig:
     """Sets some of the parameters on the GPU, frame by frame; needs the visibility `maps`."""
     quality: Quality = field(default_factory=Quality)
     fit: FitNote | None = None
-    light: Mapping[str, Any] = field(default_factory=dict)
-    """Reserved; kept as it was read."""
+    light: LightSettings = field(default_factory=LightSettings)
 
     def __repr__(self) -> str:
         fitted = ("intensity", "falloff_footprint", "extinction_coefficient")
@@ -123,11 +120,12 @@ class TunedConfig:
 
     def draws_as(self, other: "TunedConfig") -> bool:
         """Whether both draw the same images."""
-        return (self.parameters, self.visibility, self.auto, self.quality) == (
+        return (self.parameters, self.visibility, self.auto, self.quality, self.light) == (
             other.parameters,
             other.visibility,
             other.auto,
             other.quality,
+            other.light,
         )
 
     def with_full_gather(self) -> "TunedConfig":
@@ -209,8 +207,8 @@ def _document(config: TunedConfig) -> dict[str, Any]:
     }
     if config.auto is not None:
         document["auto"] = config.auto.as_dict()
-    if config.light:
-        document["light"] = dict(config.light)
+    if config.light != LightSettings():
+        document["light"] = config.light.as_dict()
     if config.fit is not None:
         document["fit"] = {"status": config.fit.status, "sentence": config.fit.sentence}
     if config.provenance:
@@ -238,7 +236,7 @@ def _config(document: dict[str, Any], where: str) -> TunedConfig:
         auto=_checked_auto(document, where),
         quality=Quality.validated(quality, f"{where}: quality", _QUALITY_PARAMETERS),
         fit=None if fit is None else _checked_fit(fit, where),
-        light=_checked_light(_object(document, "light", where), where),
+        light=LightSettings.validated(document.get("light", {}), f"{where}: light"),
     )
 
 
@@ -309,22 +307,6 @@ def _checked_provenance(provenance: Any, where: str) -> dict[str, str | int | fl
                 f"{where}: provenance.{key!r:.60} must be a string or a finite number, got {value!r:.60}"
             )
     return provenance
-
-
-def _checked_light(light: dict[str, Any], where: str) -> dict[str, Any]:
-    """As it is, where it can be written again: finite numbers, in not too many levels."""
-    level: list[Any] = [light]
-    for _ in range(DEEPEST_LIGHT):
-        below: list[Any] = []
-        for value in level:
-            if isinstance(value, float) and not math.isfinite(value):
-                raise InputError(f"{where}: light: numbers must be finite, got {value!r}")
-            if isinstance(value, dict | list):
-                below.extend(value.values() if isinstance(value, dict) else value)
-        level = below
-    if level:
-        raise InputError(f"{where}: light: must have at most {DEEPEST_LIGHT} levels")
-    return light
 
 
 def _check_checksum(checksum: Any, config: TunedConfig, where: str) -> None:

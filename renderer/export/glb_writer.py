@@ -11,7 +11,8 @@ from jaxtyping import Float64
 from PIL import Image
 
 from vpltune.renderer.files.atomic_file import written_whole
-from vpltune.renderer.scene.scene import Light, Mesh, Scene, Texture
+from vpltune.renderer.scene.files.surface import turned
+from vpltune.renderer.scene.scene import Instance, Light, Material, Mesh, Scene, Texture
 
 # OpenGL's numbers, which glTF uses: glTF 2.0, "Accessor", "Buffer View" and "Sampler".
 _FLOAT, _UNSIGNED_INT = 5126, 5125
@@ -29,7 +30,8 @@ def write_glb(path: Path, scene: Scene, *, notes: tuple[str, ...] = ()) -> None:
 
     Positions, texture coordinates and colours keep their float32 bits, textures their texels (as PNG), and
     transforms their float64 digits. Materials become matt and two-sided, which is what ours are, with their
-    alpha.
+    alpha and their emission; what emits on one side alone is called one-sided, since glTF has one word for
+    both. The environment is not written: glTF has none.
 
     Raises:
         InputError: the path cannot be written to.
@@ -60,7 +62,12 @@ class _GlbDocument:
             }
             if material.texture is not None:
                 surface["baseColorTexture"] = {"index": material.texture}
-            entry = {"name": material.name, "pbrMetallicRoughness": surface, "doubleSided": True}
+            entry = {
+                "name": material.name,
+                "pbrMetallicRoughness": surface,
+                "doubleSided": material.emits_both_ways or not material.glows,
+                **self._emission(material),
+            }
             if material.is_blended:
                 entry["alphaMode"] = "BLEND"
             elif not material.is_opaque:
@@ -68,8 +75,14 @@ class _GlbDocument:
             self._append("materials", entry)
         for mesh in scene.meshes:
             self._add_mesh(mesh)
+        turned_around: dict[int, int] = {}
         for instance in scene.instances:
-            self._add_node(instance.name, instance.to_world, {"mesh": instance.mesh})
+            index = instance.mesh
+            if _shines_behind_in_gltf(scene, instance):
+                if index not in turned_around:
+                    turned_around[index] = self._add_mesh(turned(scene.meshes[index]))
+                index = turned_around[index]
+            self._add_node(instance.name, instance.to_world, {"mesh": index})
         for camera in scene.cameras:
             lens = {"yfov": camera.yfov, "znear": _NEAREST * diagonal, "zfar": _FARTHEST * diagonal}
             index = self._append("cameras", {"type": "perspective", "perspective": lens})
@@ -119,7 +132,7 @@ class _GlbDocument:
             entry["min"], entry["max"] = values.min(axis=0).tolist(), values.max(axis=0).tolist()
         return self._append("accessors", entry)
 
-    def _add_mesh(self, mesh: Mesh) -> None:
+    def _add_mesh(self, mesh: Mesh) -> int:
         attributes = {
             "POSITION": self._accessor(mesh.positions, bounded=True),
             "NORMAL": self._accessor(mesh.normals),
@@ -130,7 +143,7 @@ class _GlbDocument:
             attributes["COLOR_0"] = self._accessor(mesh.colors)
         indices = self._accessor(mesh.triangles.ravel().astype(np.uint32), _ELEMENT_ARRAY_BUFFER)
         primitive = {"attributes": attributes, "indices": indices, "material": mesh.material}
-        self._append("meshes", {"name": mesh.name, "primitives": [primitive]})
+        return self._append("meshes", {"name": mesh.name, "primitives": [primitive]})
 
     def _add_texture(self, texture: Texture) -> None:
         png = io.BytesIO()
@@ -151,10 +164,29 @@ class _GlbDocument:
         )
         self._append("textures", {"source": image, "sampler": sampler})
 
+    def _emission(self, material: Material) -> dict[str, Any]:
+        """The members of a material that say what it emits."""
+        if not material.glows:
+            return {}
+        # glTF's factors end at 1; the rest is the strength.
+        strength = max(1.0, *material.emission)
+        members: dict[str, Any] = {"emissiveFactor": [channel / strength for channel in material.emission]}
+        if material.emission_texture is not None:
+            members["emissiveTexture"] = {"index": material.emission_texture}
+        if strength > 1.0:
+            self._use("KHR_materials_emissive_strength")
+            members["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
+        return members
+
+    def _use(self, extension: str) -> None:
+        used = self._root.setdefault("extensionsUsed", [])
+        if extension not in used:
+            used.append(extension)
+
     def _add_lights(self, lights: tuple[Light, ...]) -> None:
         if not lights:
             return
-        self._root["extensionsUsed"] = ["KHR_lights_punctual"]
+        self._use("KHR_lights_punctual")
         entries = self._root["extensions"] = {"KHR_lights_punctual": {"lights": []}}
         for light in lights:
             strongest = float(light.intensity.max())
@@ -172,6 +204,13 @@ class _GlbDocument:
             self._add_node(
                 light.name, _light_to_world(light), {"extensions": {"KHR_lights_punctual": reference}}
             )
+
+
+def _shines_behind_in_gltf(scene: Scene, instance: Instance) -> bool:
+    """Whether a glTF reader takes the back for the front: in a mirrored node, clockwise is the front."""
+    material = scene.materials[scene.meshes[instance.mesh].material]
+    one_way = material.glows and not material.emits_both_ways
+    return one_way and bool(np.linalg.det(instance.to_world[:3, :3]) < 0.0)
 
 
 def _light_to_world(light: Light) -> Float64[np.ndarray, "4 4"]:

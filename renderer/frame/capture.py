@@ -117,7 +117,8 @@ def capture_frame(frame: Frame, view: View, *, discs: bool, maps: bool = True) -
     near_plane = np.float32(frame.camera(view).near_plane)
     depth = np.divide(near_plane, depth_buffer, out=np.zeros_like(depth_buffer), where=valid)
     position = view.camera.position_world + ray_directions_world(view) * depth[..., None]
-    vpls = np.frombuffer(resources.read("virtual_point_lights"), np.float32).reshape(-1, 12)
+    reflected = frame.setup.pools.reflected
+    vpls = np.frombuffer(resources.read("virtual_point_lights"), np.float32).reshape(-1, 12)[:reflected]
     statistics = np.frombuffer(resources.read("frame_statistics"), np.float32)
     return CapturedFrame(
         valid=valid,
@@ -155,7 +156,10 @@ def _visibility_maps(frame: Frame) -> VisibilityMaps | None:
     texels = np.where(refined[..., None], np.uint32(0), texels)
     block = np.full(refined.shape, -1, np.int32)
     block[refined] = np.arange(len(details), dtype=np.int32)
-    return VisibilityMaps(texels, corner, block, details)
+    # The last VPLs may lie on glowing surfaces. Their light is direct, and no part of what is captured.
+    reflected = frame.setup.pools.reflected
+    texels, corner, block = texels[:reflected], corner[:reflected], block[:reflected]
+    return VisibilityMaps(texels, corner, block, details[: int((block >= 0).sum())])
 
 
 def _met_surfaces(

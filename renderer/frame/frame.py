@@ -14,6 +14,7 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.auto_prior import AutoPrior
 from vpltune.renderer.config.parameter_block import BLOCK_BYTES, parameter_bytes, unpack_parameters
 from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.disc_samples import sample_count
 from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
 from vpltune.renderer.frame.frame_timing import PassClock
 from vpltune.renderer.frame.light_pre_pass import LightPrePass
@@ -22,7 +23,10 @@ from vpltune.renderer.frame.passes.blended_shadow import SHADOW_READS, BlendedSh
 from vpltune.renderer.frame.passes.clustered_discs import ClusteredDiscsPass
 from vpltune.renderer.frame.passes.direct_light import DirectLightPass
 from vpltune.renderer.frame.passes.geometry import GeometryPass
+from vpltune.renderer.frame.passes.glowing_surfaces import GlowingSurfacesPass
 from vpltune.renderer.frame.passes.interleaved_filter import InterleavedFilterPass, NearFieldFilterPass
+from vpltune.renderer.frame.passes.joined_vpls import JoinedVplsPass
+from vpltune.renderer.frame.passes.light_walks import WALKS, LightWalksPass, walk_table
 from vpltune.renderer.frame.passes.material_resolve import MaterialResolvePass
 from vpltune.renderer.frame.passes.receiver_bounds import ReceiverBoundsPass
 from vpltune.renderer.frame.passes.reflective_shadow_map import ReflectiveShadowMapPass
@@ -31,13 +35,19 @@ from vpltune.renderer.frame.passes.screen_space_indirect import BLOCK as NEAR_FI
 from vpltune.renderer.frame.passes.screen_space_indirect import ScreenSpaceIndirectPass
 from vpltune.renderer.frame.passes.tone_mapping import ToneMappingPass
 from vpltune.renderer.frame.passes.virtual_point_lights import VirtualPointLightsPass, VplDensityPass
-from vpltune.renderer.frame.passes.vpl_gather import GatherListedPixelsPass, VplGatherPass
+from vpltune.renderer.frame.passes.vpl_gather import (
+    GatherGlowingPass,
+    GatherListedPixelsPass,
+    VplGatherPass,
+)
 from vpltune.renderer.frame.passes.vpl_importance import VplImportancePass, importance_cells
 from vpltune.renderer.frame.passes.vpl_visibility_maps import VplVisibilityMapsPass
 from vpltune.renderer.frame.rsm_resolution import rsm_resolution
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
 from vpltune.renderer.frame.visibility_map_layout import VisibilityMapLayout
+from vpltune.renderer.frame.vpl_pools import DiscPool, VplPools
 from vpltune.renderer.gpu.camera_uniforms import CameraUniforms, camera_uniforms
+from vpltune.renderer.gpu.glowing_triangles import GlowingTriangles
 from vpltune.renderer.gpu.ray_hierarchy import RayHierarchy
 from vpltune.renderer.gpu.render_targets import (
     create_direction_target,
@@ -55,6 +65,7 @@ from vpltune.renderer.scene.light_faces import (
     face_count,
     light_records,
 )
+from vpltune.renderer.scene.scene import Light
 from vpltune.renderer.scene.sun_faces import SunGrid
 from vpltune.renderer.scene.views import View
 
@@ -68,23 +79,38 @@ class FrameSetup:
     face_count: int
     rsm_resolution: int
     importance_cells: int
-    vpl_count: int
+    pools: VplPools
+    bounces: int | None
+    """Reflections before light reaches the receiver; None for all."""
     interleave: int
     maps: VisibilityMapLayout
     prior: AutoPrior | None
     adaptation_frames: float
 
     @classmethod
-    def of(cls, view: View, config: TunedConfig, nested_faces: int) -> "FrameSetup":
-        """The set-up that draws `view` with `config`, in a scene whose suns have so many nested faces."""
-        count = config.parameters.vpl_count
+    def of(
+        cls, view: View, config: TunedConfig, nested_faces: int, *, glows: bool, sky_lights: int = 0
+    ) -> "FrameSetup":
+        """The set-up that draws `view` with `config`.
+
+        Args:
+            view: gives size and lights.
+            config: gives all else.
+            nested_faces: of each sun in the scene.
+            glows: whether a surface of the scene glows.
+            sky_lights: lights that stand for the scene's sky.
+        """
+        count, bounces = config.parameters.vpl_count, config.light.most_bounces
+        has_lights = bool(view.lights) or sky_lights > 0
+        pools = VplPools.of(count, has_lights=has_lights, glows=glows, bounces=bounces)
         return cls(
             size=view.size,
-            face_count=face_count(view.lights, nested_faces),
-            rsm_resolution=rsm_resolution(view.lights, config.quality),
-            importance_cells=importance_cells(face_count(view.lights, nested_faces=0)),
-            vpl_count=count,
-            interleave=config.quality.interleave_for(count, view.size),
+            face_count=face_count(view.lights, nested_faces) + sky_lights,
+            rsm_resolution=rsm_resolution(view.lights, config.quality, sky_lights),
+            importance_cells=importance_cells(face_count(view.lights, nested_faces=0) + sky_lights),
+            pools=pools,
+            bounces=bounces,
+            interleave=config.quality.interleave_for(pools.reflected, view.size),
             maps=VisibilityMapLayout.of(config),
             prior=config.auto,
             adaptation_frames=config.quality.adaptation_frames,
@@ -100,6 +126,7 @@ class Frame:
         setup: FrameSetup,
         options: RuntimeOptions,
         hierarchy: RayHierarchy | None,
+        glowing: GlowingTriangles | None,
     ):
         self.setup = setup
         self.scene = scene
@@ -119,19 +146,14 @@ class Frame:
         shadow_reads = SHADOW_READS if scene.has_blended else ()
         if scene.has_blended:
             self._seen.append(BlendedShadowPass(resources, scene, rsm))
-        self._seen.append(DirectLightPass(resources, rsm, shadow_reads))
-        self._placed: list[FramePass] = [
-            VirtualPointLightsPass(
-                resources, rsm, setup.vpl_count, options.point_table, options.rsm_filtering, cells
-            ),
-            ClusteredDiscsPass(resources, setup.vpl_count),
-        ]
+        punctual = "direct_irradiance" if glowing is None else "punctual_irradiance"
+        self._seen.append(DirectLightPass(resources, rsm, punctual, shadow_reads))
+        self._placed: list[FramePass] = self._placing_passes(options, hierarchy, glowing)
         """VPLs, what they see, and the parameters that a prior sets from it."""
         if setup.maps.size:
             assert hierarchy is not None, "visibility maps are cast as rays"
-            hierarchy.add_to(resources)
             self._seen.append(ReceiverBoundsPass(resources))
-            self._placed.append(VplVisibilityMapsPass(resources, setup.vpl_count, setup.maps, hierarchy))
+            self._placed.append(VplVisibilityMapsPass(resources, setup.pools.total, setup.maps, hierarchy))
         self._statistics: SceneStatisticsPass | None = None
         if setup.prior is not None:
             self._statistics = SceneStatisticsPass(resources, setup.maps)
@@ -139,18 +161,22 @@ class Frame:
             self._placed.append(AutoParametersPass(resources, setup.prior, setup.adaptation_frames))
         near_field = ScreenSpaceIndirectPass(resources, rsm, cells)
         self._gathered: list[FramePass] = [
-            VplGatherPass(resources, setup.interleave, setup.maps),
+            *([] if glowing is None else [GatherGlowingPass(resources, setup.maps, setup.pools)]),
+            VplGatherPass(resources, setup.interleave, setup.maps, setup.pools),
             *self._interleaved_passes(),
             near_field,
             NearFieldFilterPass(resources, NEAR_FIELD_BLOCK, near_field.wanted),
         ]
-        """Indirect light."""
+        """Light from VPLs."""
         self._near_field_wanted = near_field.wanted
-        self._material_resolve = MaterialResolvePass(resources)
+        self._material_resolve = MaterialResolvePass(
+            resources, glows=scene.glows, shows_sky="environment_map" in resources
+        )
         self._tone_mapping = ToneMappingPass(resources)
 
     def draw(self, inputs: FrameInputs, clock: PassClock | None = None) -> None:
         """Draw up to the irradiance buffers; `clock` times each pass."""
+        self._camera = inputs.camera
         self._write_lights(inputs.records)
         self._write_parameters(inputs.parameters)
         self._run([*self._seen, *self._placed, *self._gathered], inputs, clock)
@@ -175,7 +201,7 @@ class Frame:
         `share` weighs direct and indirect light; `exposure` None measures it from the image.
         """
         with _timed(clock, self._material_resolve.name):
-            self._material_resolve.draw(share)
+            self._material_resolve.draw(share, self._camera)
         with _timed(clock, self._tone_mapping.name):
             self._tone_mapping.draw(exposure)
 
@@ -209,13 +235,15 @@ class Frame:
     def _make_targets(self) -> None:
         resources, setup = self.resources, self.setup
         context, size = resources.context, setup.size
-        self.gbuffer = create_gbuffer(context, size)
+        self.gbuffer = create_gbuffer(context, size, glows=self.scene.glows)
         self.rsm = create_reflective_shadow_map(context, setup.rsm_resolution, setup.face_count)
         for name in ("depth", "normal", "albedo"):
             resources[f"gbuffer_{name}"] = getattr(self.gbuffer, name)
+        if self.gbuffer.emission is not None:
+            resources["gbuffer_emission"] = self.gbuffer.emission
         for name in ("depth", "normal", "reflectance"):
             resources[f"rsm_{name}"] = getattr(self.rsm, name)
-        names = ("direct", "vpl", "near_field", "shared")
+        names = ["direct", "vpl", "near_field", "shared"] + ["punctual"] * (setup.pools.glowing > 0)
         for name in names:
             resources[f"{name}_irradiance"] = create_irradiance_target(context, size)
         resources.alias("indirect_irradiance", "vpl_irradiance")
@@ -236,8 +264,49 @@ class Frame:
         shadowed = self.setup.maps.size > 0
         return [
             InterleavedFilterPass(self.resources, self.setup.interleave, shadowed=shadowed),
-            GatherListedPixelsPass(self.resources, self.setup.maps),
+            GatherListedPixelsPass(self.resources, self.setup.maps, self.setup.pools),
         ]
+
+    def _placing_passes(
+        self, options: RuntimeOptions, hierarchy: RayHierarchy | None, glowing: GlowingTriangles | None
+    ) -> list[FramePass]:
+        """The passes that place the VPLs of each pool."""
+        resources, setup, pools = self.resources, self.setup, self.setup.pools
+        if hierarchy is not None:
+            hierarchy.add_to(resources)
+        discs = [DiscPool.first(pools.first)]
+        has_lamps = setup.face_count > 0
+        starts = None
+        light: list[FramePass] = []
+        glowing_discs = None
+        if glowing is not None:
+            glowing_discs = DiscPool("glowing", pools.glowing, sample_count(pools.glowing))
+            light.append(GlowingSurfacesPass(resources, glowing, glowing_discs))
+        if pools.later:
+            assert hierarchy is not None, "light walks along rays"
+            lamp_walks = WALKS // (1 + (glowing is not None))
+            starts = walk_table(lamp_walks)[:, :2] if has_lamps else None
+        light.insert(
+            0,
+            VirtualPointLightsPass(
+                resources,
+                self.rsm,
+                pools.first,
+                options.point_table,
+                options.rsm_filtering,
+                setup.importance_cells,
+                starts,
+            ),
+        )
+        if pools.later:
+            assert hierarchy is not None, "light walks along rays"
+            walks = LightWalksPass(resources, hierarchy, setup.bounces, glowing_discs, has_lamps=has_lamps)
+            light.append(walks)
+            discs.append(DiscPool("later", pools.later, walks.sample_count))
+        if glowing_discs is not None:
+            discs.append(glowing_discs)
+        clustered = [ClusteredDiscsPass(resources, pool) for pool in discs]
+        return [*light, *clustered, JoinedVplsPass(resources, discs)]
 
     def _run(self, passes: list[FramePass], inputs: FrameInputs, clock: PassClock | None) -> None:
         indirect = "near_field_irradiance" if self._near_field_wanted(inputs) else "vpl_irradiance"
@@ -264,7 +333,13 @@ class Frame:
 
 
 def frame_light_records(
-    scene: SceneBuffers, view: View, rsm_resolution: int, nested_faces: int, *, snapped: bool
+    scene: SceneBuffers,
+    view: View,
+    rsm_resolution: int,
+    nested_faces: int,
+    sky: tuple[Light, ...] = (),
+    *,
+    snapped: bool,
 ) -> LightRecords:
     """The view's lights as records for the scene as it stands.
 
@@ -272,13 +347,14 @@ def frame_light_records(
         scene: gives the bounds.
         view: camera and lights.
         rsm_resolution: texels along the side of a face.
-        nested_faces: of each directional light.
+        nested_faces: of each directional light of the view.
+        sky: lights that stand for the scene's sky.
         snapped: whether a directional light's faces keep their grid in the world while things move.
     """
     length = float(np.linalg.norm(scene.rest_bounds[1] - scene.rest_bounds[0])) if snapped else None
     x, y, z = view.camera.position_world.tolist()
     return light_records(
-        view.lights, scene.bounds(), SunGrid(rsm_resolution, (x, y, z), nested_faces, length)
+        view.lights, scene.bounds(), SunGrid(rsm_resolution, (x, y, z), nested_faces, length), sky
     )
 
 

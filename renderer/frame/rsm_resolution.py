@@ -20,13 +20,15 @@ MOST_FACES = MOST_TEXELS // LEAST_RESOLUTION**2
 """Faces that there is room for: 1,365 point lights."""
 
 
-def rsm_resolution(lights: tuple[Light, ...], quality: Quality | None = None) -> int:
+def rsm_resolution(lights: tuple[Light, ...], quality: Quality | None = None, sky_lights: int = 0) -> int:
     """Texels along the side of each face of these lights: what `quality` says, else by their number.
+
+    `sky_lights` is how many lights of one face there are besides, for the sky.
 
     Raises:
         InputError: there are more than `MOST_FACES`.
     """
-    count = face_count(lights, nested_faces=0)
+    count = face_count(lights, nested_faces=0) + sky_lights
     if count > MOST_FACES:
         raise InputError(
             f"lights: must have at most {MOST_FACES:,} shadow map faces, got {len(lights):,} lights with "

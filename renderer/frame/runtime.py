@@ -1,30 +1,32 @@
 """The runtime: draws a scene, one view and one config at a time."""
 
-import functools
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
-from typing import Any, Literal, get_args
+from collections.abc import Sequence
+from typing import Literal, get_args
 
 import moderngl
 import numpy as np
 from jaxtyping import Float32
 
-from vpltune.renderer.config.artist_parameters import ArtistParameters, placement
+from vpltune.renderer.config.artist_parameters import placement
 from vpltune.renderer.config.tuned_config import TunedConfig
-from vpltune.renderer.errors import MachineError
-from vpltune.renderer.frame.capture import CapturedFrame, capture_frame, in_world_units, read_image
+from vpltune.renderer.frame.capture import CapturedFrame, read_image
 from vpltune.renderer.frame.clip_state import ClipState
+from vpltune.renderer.frame.drawn_frame import DrawnFrame, on_own_context
 from vpltune.renderer.frame.frame import Frame, FrameSetup, frame_light_records
 from vpltune.renderer.frame.frame_pass import FrameInputs
 from vpltune.renderer.frame.frame_timing import PassClock, frame_milliseconds
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
 from vpltune.renderer.frame.visibility_map_layout import NO_MAPS
+from vpltune.renderer.frame.vpl_pools import VplPools
+from vpltune.renderer.gpu.glowing_triangles import GlowingTriangles
 from vpltune.renderer.gpu.gpu_context import check_errors, create_context, free_dropped
 from vpltune.renderer.gpu.ray_hierarchy import RayHierarchy
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
 from vpltune.renderer.scene.animation import Pose
 from vpltune.renderer.scene.dynamic_lights import DynamicLights, scaled_records
-from vpltune.renderer.scene.scene import Scene, scaled
+from vpltune.renderer.scene.scene import Light, Scene, scaled
+from vpltune.renderer.scene.sky_lights import sky_lights
 from vpltune.renderer.scene.sun_faces import nested_face_count
 from vpltune.renderer.scene.views import View, scaled_view
 from vpltune.renderer.scene.working_scale import working_scale
@@ -39,73 +41,8 @@ KEPT_FRAMES = 2
 _SHARES = {"direct": (1.0, 0.0), "indirect": (0.0, 1.0)}
 
 
-def _on_own_context(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Make the object's context current before a call: another runtime may have taken its place.
-
-    It stays current. moderngl's `with context` would leave none current behind it, not the one before.
-    """
-
-    @functools.wraps(method)
-    def on_own_context(self: "Runtime | DrawnFrame", *arguments: object, **keywords: object) -> Any:
-        self.context.__enter__()
-        try:
-            return method(self, *arguments, **keywords)
-        except moderngl.Error as error:
-            # Targets that do not fit into memory leave a framebuffer incomplete; all else is a defect.
-            if "not complete" not in str(error):
-                raise
-            renderer = self.context.info["GL_RENDERER"]
-            raise MachineError(f"OpenGL: {error} ({renderer}); a smaller --size may do") from error
-
-    return on_own_context
-
-
-class DrawnFrame:
-    """A frame as it was drawn, still on the GPU; it holds until the runtime draws again."""
-
-    def __init__(self, frame: Frame, inputs: FrameInputs, view: View, config: TunedConfig, scale: float):
-        self.frame = frame
-        self.inputs = inputs
-        self._scale = scale
-        self._view = view
-        self._config = config
-
-    @property
-    def context(self) -> moderngl.Context:
-        """The OpenGL context that it was drawn on."""
-        return self.frame.resources.context
-
-    @property
-    def display(self) -> moderngl.Texture:
-        """The 8-bit display image, row 0 at the bottom."""
-        return self.frame.texture("display")
-
-    @_on_own_context
-    def read_exposure(self) -> float:
-        """What radiance was multiplied by for display: waits for the GPU."""
-        return self.frame.read_exposure()
-
-    @_on_own_context
-    def read_parameters(self) -> ArtistParameters:
-        """The parameters that it was drawn with; waits for the GPU where a prior set some of them."""
-        return self._config.parameters if self._config.auto is None else self.frame.read_parameters()
-
-    @_on_own_context
-    def capture(self, *, maps: bool = True) -> CapturedFrame:
-        """Read back the buffers that the gather reads and makes; `maps` False leaves out visibility maps."""
-        discs = self._config.parameters.vpls_are_discs
-        captured = capture_frame(self.frame, self._view, discs=discs, maps=maps)
-        check_errors(self.context, f"the buffers of view {self._view.name}")
-        return in_world_units(captured, self._scale)
-
-    @_on_own_context
-    def read_statistics(self) -> Float32[np.ndarray, " statistics"]:
-        """The scene statistics that `renderer.config.scene_statistics` names: waits for the GPU."""
-        return self.frame.read_statistics(self.inputs)
-
-
 class Runtime:
-    """Draws a scene with direct light and one bounce of VPL light, on the GPU alone.
+    """Draws a scene with direct light, and light reflected once or more from VPLs, on the GPU alone.
 
     Drawing is a function of view, config and state: two calls with the same arguments give the same image,
     whatever was drawn between them. Only `pose` changes the scene.
@@ -132,6 +69,8 @@ class Runtime:
         self._scale = working_scale(scene)
         self._scene = scene = scaled(scene, self._scale) if self._scale != 1.0 else scene
         self.scene_buffers = SceneBuffers(self._context, scene)
+        self._skies: dict[int, tuple[Light, ...]] = {}
+        self._glowing = GlowingTriangles(self._context, scene, self.scene_buffers)
         self._hierarchy: RayHierarchy | None = None
         self._nested_faces = nested_face_count(scene)
         self._frames: OrderedDict[FrameSetup, Frame] = OrderedDict()
@@ -144,13 +83,13 @@ class Runtime:
         """The OpenGL context, for other runtimes to share."""
         return self._context
 
-    @_on_own_context
+    @on_own_context
     def pose(self, pose: Pose) -> None:
         """Move the scene; takes effect with the next image."""
         grow = np.diag([self._scale, self._scale, self._scale, 1.0])
         self.scene_buffers.set_pose(grow @ pose.transforms, grow @ pose.joint_matrices)
 
-    @_on_own_context
+    @on_own_context
     def render(
         self,
         view: View,
@@ -190,7 +129,7 @@ class Runtime:
         drawn.frame.resolve(_SHARES.get(layer, (1.0, 1.0)), exposure)
         return self._read(drawn, "display" if layer == "final" else "radiance", f"layer {layer}", view)
 
-    @_on_own_context
+    @on_own_context
     def draw(
         self,
         view: View,
@@ -209,7 +148,7 @@ class Runtime:
         drawn.frame.resolve((1.0, 1.0), exposure)
         return drawn
 
-    @_on_own_context
+    @on_own_context
     def render_radiance(
         self,
         view: View,
@@ -223,7 +162,7 @@ class Runtime:
         drawn.frame.resolve((1.0, 1.0), 1.0)
         return self._read(drawn, "radiance", "the radiance", view)
 
-    @_on_own_context
+    @on_own_context
     def display(self, radiance: np.ndarray, exposure: float | None = None) -> np.ndarray:
         """Any radiance image, [height, width, 3 or 4], through this runtime's exposure and tone curve.
 
@@ -232,12 +171,12 @@ class Runtime:
         frame = self._tone_mapped(radiance, exposure)
         return np.ascontiguousarray(read_image(frame.resources, "display")[..., :3])
 
-    @_on_own_context
+    @on_own_context
     def measured_exposure(self, radiance: np.ndarray) -> float:
         """The exposure that `display` measures for a radiance image."""
         return self._tone_mapped(radiance, None).read_exposure()
 
-    @_on_own_context
+    @on_own_context
     def capture(
         self,
         view: View,
@@ -258,7 +197,7 @@ class Runtime:
         drawn = self._draw(view, config, state, table_rotation=table_rotation, lights=lights)
         return drawn.capture(maps=maps)
 
-    @_on_own_context
+    @on_own_context
     def captures(
         self, view: View, config: TunedConfig, table_rotations: Sequence[tuple[float, float]]
     ) -> list[CapturedFrame]:
@@ -273,7 +212,7 @@ class Runtime:
             captured.append(drawn.capture())
         return captured
 
-    @_on_own_context
+    @on_own_context
     def capture_variants(
         self,
         view: View,
@@ -288,9 +227,7 @@ class Runtime:
         Raises:
             ValueError: there are no configs, they draw VPLs differently, or one has a prior.
         """
-        drawn_as = {
-            (placement(each.parameters), FrameSetup.of(view, each, self._nested_faces)) for each in configs
-        }
+        drawn_as = {(placement(each.parameters), self._setup(view, each)) for each in configs}
         if len(drawn_as) != 1:
             raise ValueError("capture_variants: configs must be one or more with one placement of the VPLs")
         if any(each.auto is not None for each in configs):
@@ -304,7 +241,7 @@ class Runtime:
             images.append(self._read(drawn, "indirect_irradiance", "the irradiance", view))
         return captured, images
 
-    @_on_own_context
+    @on_own_context
     def pass_milliseconds(
         self, view: View, config: TunedConfig, frames: int = 5, lights: DynamicLights | None = None
     ) -> dict[str, float]:
@@ -317,7 +254,7 @@ class Runtime:
             clock.end_frame()
         return clock.milliseconds()
 
-    @_on_own_context
+    @on_own_context
     def frame_milliseconds(
         self, view: View, config: TunedConfig, frames: int = 5, lights: DynamicLights | None = None
     ) -> float:
@@ -327,7 +264,7 @@ class Runtime:
 
     def _tone_mapped(self, radiance: np.ndarray, exposure: float | None) -> Frame:
         height, width = radiance.shape[:2]
-        frame = self._frame(FrameSetup((width, height), 1, 1, 1, 1, 1, NO_MAPS, None, 0.0))
+        frame = self._frame(FrameSetup((width, height), 1, 1, 1, VplPools(1), 1, 1, NO_MAPS, None, 0.0))
         pixels = np.ones((height, width, 4), np.float32)
         pixels[..., : radiance.shape[2]] = radiance
         frame.texture("radiance").write(np.ascontiguousarray(pixels[::-1]).tobytes())
@@ -343,7 +280,7 @@ class Runtime:
         table_rotation: tuple[float, float] = (0.0, 0.0),
         lights: DynamicLights | None = None,
     ) -> DrawnFrame:
-        frame = self._frame(FrameSetup.of(view, config, self._nested_faces))
+        frame = self._frame(self._setup(view, config))
         inputs = self._inputs(view, config, state, table_rotation=table_rotation, lights=lights)
         frame.draw(inputs)
         return DrawnFrame(frame, inputs, self._scaled(view), config, self._scale)
@@ -360,7 +297,7 @@ class Runtime:
         table_rotation: tuple[float, float] = (0.0, 0.0),
         lights: DynamicLights | None = None,
     ) -> FrameInputs:
-        frame = self._frame(FrameSetup.of(view, config, self._nested_faces))
+        frame = self._frame(self._setup(view, config))
         view = self._scaled(view)
         if lights is not None and self._scale != 1.0:
             lights = DynamicLights(scaled_records(lights.records, self._scale))
@@ -372,6 +309,7 @@ class Runtime:
                 view,
                 frame.setup.rsm_resolution,
                 self._nested_faces,
+                self._sky(config),
                 snapped=self.options.rsm_snapping,
             ),
             parameters=config.parameters,
@@ -393,8 +331,22 @@ class Runtime:
         while len(self._frames) >= KEPT_FRAMES:
             self._frames.popitem(last=False)
         free_dropped(self._context)
-        if setup.maps.size and self._hierarchy is None:
+        casts_rays = setup.maps.size > 0 or setup.pools.later > 0
+        if casts_rays and self._hierarchy is None:
             self._hierarchy = RayHierarchy(self._context, self._scene, self.scene_buffers)
-        hierarchy = self._hierarchy if setup.maps.size else None
-        frame = self._frames[setup] = Frame(self.scene_buffers, setup, self.options, hierarchy)
+        hierarchy = self._hierarchy if casts_rays else None
+        glowing = self._glowing if setup.pools.glowing else None
+        frame = self._frames[setup] = Frame(self.scene_buffers, setup, self.options, hierarchy, glowing)
         return frame
+
+    def _setup(self, view: View, config: TunedConfig) -> FrameSetup:
+        glows, sky = self._glowing.count > 0, len(self._sky(config))
+        return FrameSetup.of(view, config, self._nested_faces, glows=glows, sky_lights=sky)
+
+    def _sky(self, config: TunedConfig) -> tuple[Light, ...]:
+        environment, count = self._scene.environment, config.light.sky_lights
+        if environment is None:
+            return ()
+        if count not in self._skies:
+            self._skies[count] = sky_lights(environment, count)
+        return self._skies[count]

@@ -147,6 +147,10 @@ class RasterProgram:
         self._declaration.bind(self._resources)
         set_uniforms(self.program, **uniforms)
 
+    def reads(self, name: str) -> bool:
+        """Whether a name is declared."""
+        return name in self._declaration.units
+
     def unit(self, name: str) -> int:
         """The texture unit of a declared name."""
         return self._declaration.units[name]

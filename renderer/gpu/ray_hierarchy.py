@@ -1,9 +1,8 @@
 """Rays in compute shaders: the two levels of boxes that `shaders/common/ray_hierarchy.glsl` walks through.
 
 Below, one tree for each mesh in the mesh's own space, made once. Above, a tree over the instances as they
-stand, made anew whenever one of them has moved. A skinned mesh falls into rigid pieces: each triangle goes
-with the joint that weighs most in it. Seams between pieces may open or overlap by what blending would have
-smoothed.
+stand, made anew whenever one of them has moved. A skinned mesh falls into rigid pieces
+(`renderer.gpu.rigid_pieces`).
 """
 
 from dataclasses import dataclass
@@ -22,9 +21,11 @@ from vpltune.renderer.gpu.bounding_volumes import (
 from vpltune.renderer.gpu.gpu_context import check_errors
 from vpltune.renderer.gpu.ray_alpha import RayAlpha
 from vpltune.renderer.gpu.resources import Resources
+from vpltune.renderer.gpu.rigid_pieces import first_matrix_rows, pieces_of_mesh
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
 from vpltune.renderer.gpu.shader_library import Define
-from vpltune.renderer.scene.scene import Mesh, Scene
+from vpltune.renderer.scene.placement.triangle_albedo import triangle_albedo
+from vpltune.renderer.scene.scene import Scene
 
 # Levels of a mesh's tree, and of the tree over instances; deeper parts become larger leaves. Choices, which
 # set the stack of a ray.
@@ -39,6 +40,7 @@ RAY_DEFINES = {
 RAY_READS = ("ray_nodes", "ray_triangles", "ray_instances")
 """And what its program declares. Both are those of a scene whose surfaces are all opaque."""
 
+# Position and, in the fourth number, one channel of the albedo: without it the number would be padding.
 _TRIANGLE_DTYPE = np.dtype([(corner, "f4", 4) for corner in "abc"])
 _INSTANCE_DTYPE = np.dtype([("world_to_instance", "f4", (3, 4)), ("root", "u4", 4)])
 
@@ -65,8 +67,9 @@ class RayHierarchy:
     """The buffers behind `ray_hit` of shaders/common/ray_hierarchy.glsl.
 
     Takes 48 bytes for each triangle of a mesh and 33 to 61 for the boxes around it (64 for each pair of
-    nodes), however often the mesh is placed; and 128 for each instance. A triangle with holes takes 24 more,
-    and a texel of its texture one. Building takes about 1 µs for each triangle.
+    nodes), however often the mesh is placed; and 128 for each instance. The mean albedo of a triangle takes
+    no room of its own. A triangle with holes takes 24 bytes more, and a texel of its texture one. Building
+    takes about 1 µs for each triangle.
 
     Example:
         >>> rays = RayHierarchy(context, scene, scene_buffers)
@@ -83,7 +86,7 @@ class RayHierarchy:
         placed = _placed_trees(scene)
         self._rows = np.array([row for _, row in placed.instances], np.int64)
         self._first_mesh_node = 2 * max(1, len(placed.instances) - 1)
-        roots, nodes, triangles = self._joined(placed)
+        roots, nodes, triangles = self._joined(scene, placed)
         alpha = RayAlpha(scene, placed.surfaces)
         of_instance = np.array([tree for tree, _ in placed.instances], np.int64)
         boxes = np.array([[tree.low, tree.high] for tree in placed.trees], np.float64).reshape(-1, 2, 3)
@@ -136,7 +139,7 @@ class RayHierarchy:
         resources["ray_triangles"] = self._triangles
         resources["ray_instances"] = self._instances
 
-    def _joined(self, placed: _Placed) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _joined(self, scene: Scene, placed: _Placed) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Roots, all nodes (room for the instances' first) and all triangles, with their places put right."""
         nodes = [np.zeros(self._first_mesh_node, NODE_DTYPE)]
         roots = np.zeros(len(placed.trees), np.uint32)
@@ -151,8 +154,11 @@ class RayHierarchy:
         corners = np.zeros(max(1, first_triangle), _TRIANGLE_DTYPE)
         if first_triangle:
             joined = np.concatenate(placed.triangles)
+            albedo = [triangle_albedo(scene, scene.meshes[mesh])[own] for mesh, own in placed.surfaces]
+            channels = np.concatenate(albedo).T
             for corner, name in enumerate("abc"):
                 corners[name][:, :3] = joined[:, corner]
+                corners[name][:, 3] = channels[corner]
         return roots, np.concatenate(nodes), corners
 
     def _top_nodes(self, to_world: np.ndarray, seen: Int64[np.ndarray, " seen"]) -> np.ndarray:
@@ -183,39 +189,19 @@ def _moved(child: np.ndarray, first_node: int, first_item: int) -> np.ndarray:
 
 def _placed_trees(scene: Scene) -> _Placed:
     placed = _Placed([], [], [], [])
-    skins = () if scene.animation is None else scene.animation.skins
-    first_joints = len(scene.instances) + np.cumsum([0] + [len(skin.joints) for skin in skins])
+    rows = first_matrix_rows(scene)
     pieces: dict[int, list[tuple[int, int]]] = {}
     for index, instance in enumerate(scene.instances):
         mesh = scene.meshes[instance.mesh]
         if instance.mesh not in pieces:
             pieces[instance.mesh] = [
                 (joint, _add_tree(placed, corners, instance.mesh, own))
-                for joint, corners, own in _rigid_pieces(mesh)
+                for joint, corners, own in pieces_of_mesh(mesh)
                 if len(corners)
             ]
-        first = index
-        if mesh.skinning is not None and scene.animation is not None:
-            first = int(first_joints[scene.animation.instance_skins[index]])
+        first = rows[index]
         placed.instances.extend((tree, first + joint) for joint, tree in pieces[instance.mesh])
     return placed
-
-
-def _rigid_pieces(
-    mesh: Mesh,
-) -> list[tuple[int, Float32[np.ndarray, "triangles 3 3"], Int64[np.ndarray, " triangles"]]]:
-    """What moves as one: its joint (0 where there is no skin), corners, and which of the mesh's triangles."""
-    if mesh.skinning is None:
-        return [(0, mesh.positions[mesh.triangles], np.arange(len(mesh.triangles)))]
-    joints = mesh.skinning.joints[mesh.triangles].reshape(len(mesh.triangles), -1)
-    weights = mesh.skinning.weights[mesh.triangles].reshape(len(mesh.triangles), -1)
-    shares = ((joints[:, :, None] == joints[:, None, :]) * weights[:, None, :]).sum(axis=2)
-    heaviest = np.take_along_axis(joints, shares.argmax(axis=1)[:, None], axis=1)[:, 0]
-    corners = mesh.skinning.bind_positions[mesh.triangles]
-    return [
-        (int(joint), corners[heaviest == joint], np.flatnonzero(heaviest == joint))
-        for joint in np.unique(heaviest)
-    ]
 
 
 def _add_tree(

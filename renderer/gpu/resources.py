@@ -105,11 +105,12 @@ class Resources:
         self.access((Access(name, HOST_BUFFER),))
         self.buffer(name).write(content)
 
-    def copy(self, source: str, target: str) -> None:
-        """Fill the buffer `target` with the beginning of the buffer `source`."""
+    def copy(self, source: str, target: str, start: int = 0) -> None:
+        """Fill the buffer `target` from byte `start` on with the buffer `source`, as far as both reach."""
         self.access((Access(source, HOST_BUFFER), Access(target, HOST_BUFFER)))
-        into = self.buffer(target)
-        self.context.copy_buffer(into, self.buffer(source), size=into.size)
+        into, content = self.buffer(target), self.buffer(source)
+        size = min(into.size - start, content.size)
+        self.context.copy_buffer(into, content, size=size, write_offset=start)
 
     def read(self, name: str, size: int = -1) -> bytes:
         """Read a buffer back, from its start: waits for the GPU."""

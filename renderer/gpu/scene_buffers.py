@@ -24,6 +24,7 @@ _INSTANCE_DTYPE = np.dtype(
         ("base_color", "f4", 4),
         ("skinning", "i4", 4),
         ("alpha", "f4", 4),
+        ("emission", "f4", 4),
     ]
 )
 _INFLUENCE_DTYPE = np.dtype([("joint", "i4"), ("weight", "f4")])
@@ -34,15 +35,17 @@ _MAX_ANISOTROPY = 8.0
 """Samples of a texture along its longer direction. A choice."""
 
 SCENE_READS = ("scene_instances", "skin_influences", "joint_matrices", "base_color_texture")
-"""What a program declares that draws the scene."""
+"""What a program declares that draws the scene; `emission_texture` too if it draws what surfaces emit."""
 
 
 @dataclass(frozen=True)
 class DrawGroup:
-    """A run of indirect draw commands that share one texture, all opaque or all not."""
+    """A run of indirect draw commands that share their textures, all opaque or all not."""
 
     texture: moderngl.Texture
     mirrored: tuple[int, int]
+    emission_texture: moderngl.Texture
+    emission_mirrored: tuple[int, int]
     first: int
     count: int
     is_opaque: bool
@@ -69,7 +72,12 @@ class SceneBuffers:
         self._records = self._instance_records()
         self._instances = context.buffer(reserve=self._records.nbytes)
         self._textures = [_upload_texture(context, texture) for texture in scene.textures]
-        self._white = context.texture((1, 1), 3, b"\xff\xff\xff")
+        self._environment = None
+        if scene.environment is not None:
+            radiance = scene.environment.radiance
+            size = (radiance.shape[1], radiance.shape[0])
+            self._environment = context.texture(size, 3, radiance.tobytes(), dtype="f4")
+        self._white = context.texture((1, 1), 3, b"\xff\xff\xff", alignment=1)
         self.draw_groups = self._make_commands()
         # gl_InstanceID ignores the base instance; a per-instance attribute does not.
         self._instance_numbers = context.buffer(np.arange(len(scene.instances), dtype="i4").tobytes())
@@ -102,17 +110,26 @@ class SceneBuffers:
         """Whether a surface lets a share of the light pass."""
         return any(self._scene.materials[mesh.material].is_blended for mesh in self._scene.meshes)
 
+    @property
+    def glows(self) -> bool:
+        """Whether a surface emits light of its own."""
+        return any(self._scene.materials[mesh.material].glows for mesh in self._scene.meshes)
+
     def draw(self, program: RasterProgram, vertex_array: moderngl.VertexArray, *, opaque: bool) -> None:
         """Draw all opaque instances, or all others, with a program that is bound.
 
-        Takes one multi-draw for each texture.
+        Takes one multi-draw for each pair of textures.
         """
         unit = program.unit("base_color_texture")
+        emission_unit = program.unit("emission_texture") if program.reads("emission_texture") else None
         for group in self.draw_groups:
             if group.is_opaque != opaque:
                 continue
             group.texture.use(unit)
             set_uniforms(program.program, mirrored=group.mirrored)
+            if emission_unit is not None:
+                group.emission_texture.use(emission_unit)
+                set_uniforms(program.program, emission_mirrored=group.emission_mirrored)
             vertex_array.render_indirect(self._commands, moderngl.TRIANGLES, group.count, group.first)
 
     def resources(self) -> Resources:
@@ -121,7 +138,9 @@ class SceneBuffers:
         resources["scene_instances"] = self._instances
         resources["skin_influences"] = self._influences
         resources["joint_matrices"] = self._joints
-        resources["base_color_texture"] = self._white
+        if self._environment is not None:
+            resources["environment_map"] = self._environment
+        resources["base_color_texture"] = resources["emission_texture"] = self._white
         return resources
 
     def set_pose(
@@ -154,7 +173,15 @@ class SceneBuffers:
         index_starts = np.cumsum([0] + [mesh.triangles.size for mesh in scene.meshes])
         materials = [scene.materials[scene.meshes[i.mesh].material] for i in scene.instances]
         # Opaque instances come first; of those, the ones without a texture.
-        kinds = [(not m.is_opaque, m.texture is not None, m.texture or 0) for m in materials]
+        kinds = [
+            (
+                not m.is_opaque,
+                m.texture is not None,
+                m.texture or 0,
+                -1 if m.emission_texture is None else m.emission_texture,
+            )
+            for m in materials
+        ]
         order = sorted(range(len(kinds)), key=kinds.__getitem__)
         commands = np.zeros(len(order), _COMMAND_DTYPE)
         groups: list[DrawGroup] = []
@@ -169,11 +196,16 @@ class SceneBuffers:
         return groups
 
     def _group(self, material: Material, first: int, count: int) -> DrawGroup:
-        if material.texture is None:
-            return DrawGroup(self._white, (0, 0), first, count, material.is_opaque)
-        source = self._scene.textures[material.texture]
+        colors = self._texture(material.texture)
+        return DrawGroup(*colors, *self._texture(material.emission_texture), first, count, material.is_opaque)
+
+    def _texture(self, index: int | None) -> tuple[moderngl.Texture, tuple[int, int]]:
+        """A texture of the scene, or white for none; and 1 for each axis that repeats mirrored."""
+        if index is None:
+            return self._white, (0, 0)
+        source = self._scene.textures[index]
         mirrored = (int(source.wrap_u == "mirrored_repeat"), int(source.wrap_v == "mirrored_repeat"))
-        return DrawGroup(self._textures[material.texture], mirrored, first, count, material.is_opaque)
+        return self._textures[index], mirrored
 
     def _instance_records(self) -> np.ndarray:
         """Everything about instances but where they are."""
@@ -185,6 +217,7 @@ class SceneBuffers:
             material = scene.materials[mesh.material]
             records["base_color"][index, :3] = material.base_color
             records["alpha"][index] = material.opacity, material.alpha_cutoff, material.is_blended, index
+            records["emission"][index] = *material.emission, material.emits_both_ways
             if mesh.skinning is not None and scene.animation is not None:
                 records["skinning"][index] = (
                     self._first_influences[instance.mesh],

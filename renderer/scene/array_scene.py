@@ -7,8 +7,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
+from vpltune.renderer.scene.environment import Environment
+from vpltune.renderer.scene.environment_baking import baked_environment
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, label
 from vpltune.renderer.scene.files.limits import (
+    LARGEST_RADIOMETRIC,
     MAX_CAMERAS,
     MAX_IMAGE_SIDE,
     MAX_INSTANCES,
@@ -31,9 +34,12 @@ def scene_from_arrays(
     albedo: Numbers = 1.0,
     triangle_albedo: Numbers | None = None,
     texture: Numbers | None = None,
+    emission: Numbers = 0.0,
+    emits_both_ways: bool = False,
     name: str = "arrays",
     lights: Sequence[Light] = (),
     cameras: Sequence[Camera] = (),
+    environment: Environment | None = None,
 ) -> Scene:
     """A scene of one mesh. Every surface is diffuse and two-sided; +Y is up where a camera is placed.
 
@@ -47,9 +53,12 @@ def scene_from_arrays(
         albedo: one number, RGB, or [vertices, 3]; linear, in [0, 1].
         triangle_albedo: [triangles, 3]; linear, in [0, 1].
         texture: [height, width, 3], uint8, sRGB; needs `uv`.
+        emission: radiance that the surface emits, one number or RGB, in W/(m² sr), from 0 to 1e18.
+        emits_both_ways: whether the back emits too. The front is where triangles wind counter-clockwise.
         name: the scene's name.
-        lights: the scene's own; without any, one is placed.
+        lights: the scene's own; without any, and where nothing else shines, one is placed.
         cameras: the scene's own; without any, one is placed.
+        environment: light from far away all around, such as an `even_sky`.
 
     Raises:
         InputError: an argument breaks one of these rules; one line names argument, rule and value.
@@ -71,11 +80,13 @@ def scene_from_arrays(
             albedo=albedo,
             triangle_albedo=triangle_albedo,
             texture=texture,
+            emission=emission,
+            emits_both_ways=emits_both_ways,
         )
         if mesh is None:
             raise SceneFileError("triangles: at least one must have area, got none that has")
         builder.place(name, mesh, np.eye(4))
-        return builder.scene(name, lights, cameras, Warnings())
+        return builder.scene(name, lights, cameras, Warnings(), environment)
 
     return read_at_border("scene_from_arrays", made)
 
@@ -102,6 +113,8 @@ class ArraySceneBuilder:
         albedo: Numbers = 1.0,
         triangle_albedo: Numbers | None = None,
         texture: Numbers | None = None,
+        emission: Numbers = 0.0,
+        emits_both_ways: bool = False,
     ) -> int | None:
         """Add a mesh with a material of its own; the arguments are those of `scene_from_arrays`.
 
@@ -127,7 +140,15 @@ class ArraySceneBuilder:
         if mesh is None:
             return None
         image = None if texture is None else self._add_texture(texture, name)
-        self._materials.append(Material(mesh.name, base_color, image))
+        self._materials.append(
+            Material(
+                mesh.name,
+                base_color,
+                image,
+                emission=_radiance(emission),
+                emits_both_ways=bool(emits_both_ways),
+            )
+        )
         self._meshes.append(mesh)
         return len(self._meshes) - 1
 
@@ -138,7 +159,12 @@ class ArraySceneBuilder:
         self._instances.append(Instance(label(name, "instance"), mesh, np.array(to_world, np.float64)))
 
     def scene(
-        self, name: str, lights: Sequence[Light], cameras: Sequence[Camera], warnings: Warnings
+        self,
+        name: str,
+        lights: Sequence[Light],
+        cameras: Sequence[Camera],
+        warnings: Warnings,
+        environment: Environment | None = None,
     ) -> Scene:
         """The scene of all that was placed, with lights and cameras checked as those of `views.json` are."""
         for what, given, most in (("lights", lights, MAX_LIGHTS), ("cameras", cameras, MAX_CAMERAS)):
@@ -155,6 +181,7 @@ class ArraySceneBuilder:
             lights=tuple(checked_light(light, f"lights[{i}]") for i, light in enumerate(lights)),
             cameras=tuple(checked_camera(camera, f"cameras[{i}]") for i, camera in enumerate(cameras)),
             warnings=warnings.lines(),
+            environment=None if environment is None else _checked_environment(environment),
         )
 
     def _add_texture(self, texture: Numbers, name: str) -> int:
@@ -213,6 +240,36 @@ def _albedo(
     if values.ndim == 2:
         return np.ones(3, np.float32), colors
     return np.broadcast_to(colors, 3).copy(), None
+
+
+def _radiance(emission: Numbers) -> tuple[float, float, float]:
+    values = _numbers(emission, "emission")
+    if values.shape not in ((), (3,)):
+        raise SceneFileError(f"emission: must be one number or RGB, got {list(values.shape)}")
+    wrong = ~((values >= 0.0) & (values <= LARGEST_RADIOMETRIC))
+    if wrong.any():
+        raise SceneFileError(
+            f"emission: must be from 0 to {LARGEST_RADIOMETRIC:g}, got {values[wrong].flat[0]:g}"
+        )
+    red, green, blue = np.broadcast_to(values, 3).tolist()
+    return red, green, blue
+
+
+def _checked_environment(environment: Environment) -> Environment:
+    """The environment, at most as large as those of files are drawn."""
+    if not isinstance(environment, Environment):
+        raise SceneFileError(f"environment: must be an Environment, got {type(environment).__name__}")
+    radiance = environment.radiance
+    if radiance.ndim != 3 or radiance.shape[2] != 3 or not radiance.size:
+        raise SceneFileError(
+            f"environment: radiance must have the shape [height, width, 3], got {list(radiance.shape)}"
+        )
+    if not (radiance.min() >= 0.0 and radiance.max() <= LARGEST_RADIOMETRIC):
+        raise SceneFileError(
+            f"environment: radiance must be from 0 to {LARGEST_RADIOMETRIC:g}, "
+            f"got {radiance.min():g} to {radiance.max():g}"
+        )
+    return baked_environment([radiance[..., channel].astype(np.float32) for channel in range(3)])
 
 
 def _in_unit_range(values: Float32[np.ndarray, "..."], what: str) -> Float32[np.ndarray, "..."]:

@@ -1,7 +1,7 @@
 """The RSM faces of lights: one for a narrow spot, five for a wide one, six for a point light, a sun's own."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64
@@ -84,7 +84,10 @@ def face_count(lights: tuple[Light, ...], nested_faces: int) -> int:
 
 
 def light_records(
-    lights: tuple[Light, ...], bounds: Float64[np.ndarray, "2 3"], grid: SunGrid
+    lights: tuple[Light, ...],
+    bounds: Float64[np.ndarray, "2 3"],
+    grid: SunGrid,
+    sky: tuple[Light, ...] = (),
 ) -> LightRecords:
     """Records of the lights and their RSM faces, for a scene within `bounds`.
 
@@ -92,11 +95,15 @@ def light_records(
         lights: the lights of a view.
         bounds: low and high corner of the scene, world units.
         grid: what the faces of directional lights are laid out by.
+        sky: directional lights that stand for parts of a sky. They come last, with one face each: what is
+            near the eye needs no finer shadow of so wide a light.
     """
-    records = np.zeros(len(lights), LIGHT_DTYPE)
+    every = (*lights, *sky)
+    records = np.zeros(len(every), LIGHT_DTYPE)
     faces: list[np.ndarray] = []
-    for index, light in enumerate(lights):
-        own = _faces(light, index, bounds, grid)
+    whole = replace(grid, nested_faces=0)
+    for index, light in enumerate(every):
+        own = _faces(light, index, bounds, grid if index < len(lights) else whole)
         records[index] = (
             (*light.position_world, KIND_CODES[light.kind]),
             (*light.direction_world, cone_scale(light.inner_cone, light.outer_cone)),

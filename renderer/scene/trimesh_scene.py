@@ -8,6 +8,7 @@ from jaxtyping import Float32
 
 from vpltune.renderer.files.srgb import linear_from_srgb
 from vpltune.renderer.scene.array_scene import ArraySceneBuilder
+from vpltune.renderer.scene.environment import Environment
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
 from vpltune.renderer.scene.files.reading_border import read_at_border
 from vpltune.renderer.scene.scene import Camera, Light, Scene
@@ -23,20 +24,23 @@ def scene_from_trimesh(
     name: str = "trimesh",
     lights: Sequence[Light] = (),
     cameras: Sequence[Camera] = (),
+    environment: Environment | None = None,
 ) -> Scene:
     """The scene of a `trimesh.Scene` or `trimesh.Trimesh`. +Y is up where a camera is placed.
 
     Colours of vertices and faces are taken as sRGB, as in a PLY file; factors of materials are linear. A
-    material's image is its texture. What has no colour is white. A camera that was set in trimesh is taken;
-    lights are not, because trimesh makes up some by itself. Point clouds and paths get a warning.
+    material's image is its texture, its emissive factor is what it emits in W/(m² sr). What has no colour is
+    white. A camera that was set in trimesh is taken; lights are not, because trimesh makes up some by itself.
+    Point clouds and paths get a warning.
 
     Args:
         source: the scene or mesh.
         smooth: shade with trimesh's vertex normals; otherwise shading is flat. trimesh joins the vertices of
             hard edges too, where its normals are averages.
         name: the scene's name.
-        lights: the scene's lights; without any, one is placed.
+        lights: the scene's lights; without any, and where nothing else shines, one is placed.
         cameras: the scene's cameras, before one that was set in trimesh.
+        environment: light from far away all around, such as an `even_sky`.
 
     Raises:
         InputError: it is neither, or an array breaks a rule of `scene_from_arrays`.
@@ -50,7 +54,7 @@ def scene_from_trimesh(
         builder, warnings = ArraySceneBuilder(), Warnings()
         if hasattr(source, "geometry") and hasattr(source, "graph"):
             _add_nodes(builder, source, smooth, warnings)
-            return builder.scene(name, lights, (*cameras, *_own_camera(source)), warnings)
+            return builder.scene(name, lights, (*cameras, *_own_camera(source)), warnings, environment)
         if not _is_mesh(source):
             raise SceneFileError(
                 f"source: must be a trimesh.Scene or trimesh.Trimesh, got {type(source).__name__}"
@@ -58,7 +62,7 @@ def scene_from_trimesh(
         mesh = _add_mesh(builder, name, source, smooth)
         if mesh is not None:
             builder.place(name, mesh, np.eye(4))
-        return builder.scene(name, lights, cameras, warnings)
+        return builder.scene(name, lights, cameras, warnings, environment)
 
     return read_at_border("scene_from_trimesh", made)
 
@@ -112,7 +116,10 @@ def _colours(visual: Any) -> dict[str, Any]:
     material = visual.material
     if hasattr(material, "to_pbr"):
         material = material.to_pbr()
-    colours: dict[str, Any] = {}
+    colours: dict[str, Any] = {"emits_both_ways": bool(getattr(material, "doubleSided", None))}
+    emissive = getattr(material, "emissiveFactor", None)
+    if emissive is not None:
+        colours["emission"] = np.asarray(emissive)[:3]
     factor = getattr(material, "baseColorFactor", None)
     if factor is not None and tuple(factor[:3]) != _NO_COLOR:
         colours["albedo"] = np.asarray(factor[:3]) / 255.0

@@ -10,6 +10,7 @@ from vpltune.renderer.frame.frame_pass import FrameInputs
 from vpltune.renderer.frame.passes.virtual_point_lights import VPL_BYTES
 from vpltune.renderer.frame.passes.vpl_gather import VplGatherPass
 from vpltune.renderer.frame.visibility_map_layout import NO_MAPS
+from vpltune.renderer.frame.vpl_pools import VplPools
 from vpltune.renderer.gpu.render_targets import create_irradiance_target
 from vpltune.renderer.gpu.resources import Resources
 
@@ -39,7 +40,7 @@ class GatheredVpls:
         resources["virtual_point_lights"] = context.buffer(reserve=max(1, count) * VPL_BYTES)
         resources["vpl_irradiance"] = create_irradiance_target(context, frame.setup.size)
         resources["artist_parameters"] = context.buffer(reserve=BLOCK_BYTES)
-        self._gather = VplGatherPass(resources, 1, NO_MAPS)
+        self._gather = VplGatherPass(resources, 1, NO_MAPS, VplPools(count))
 
     def upload(self, vpls: np.ndarray) -> None:
         """Fill the buffer with `count` records of `VPL_DTYPE`."""

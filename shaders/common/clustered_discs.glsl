@@ -33,7 +33,7 @@ float cluster_length(float scene_length, VirtualPointLight one) {
 // Sums over the samples of one cluster. Offsets are relative to the VPL's previous position: they are short, so float32
 // sums lose few digits.
 struct ClusterSums {
-    vec4 offset_count;   // Σ offset [world units]; number of samples
+    vec4 offset_count;   // Σ offset [world units]; number of samples, each by its weight
     vec4 normal_square;  // Σ unit normal; Σ |offset|² [world units²]
     vec4 flux_square;    // Σ flux [W]; Σ l²/2 [world units²], the spread of the samples' own discs
 };
@@ -47,18 +47,20 @@ ClusterSums joined(ClusterSums one, ClusterSums other) {
         one.flux_square + other.flux_square);
 }
 
-// `sums` with one more sample; `before` is the VPL's previous position.
+// `sums` with one more sample; `before` is the VPL's previous position. Samples whose flux differs a lot have a weight in
+// `flux.w` (light_walks/walk_statistics.comp); the others have 0 there, and all count alike.
 ClusterSums with_sample(ClusterSums sums, VirtualPointLight one, vec3 before) {
     vec3 offset = one.position_footprint.xyz - before;
     float footprint = one.position_footprint.w;
+    float weight = one.flux.w > 0.0 ? one.flux.w : 1.0;
     return joined(sums, ClusterSums(
-        vec4(offset, 1.0), vec4(one.normal_area.xyz, dot(offset, offset)),
-        vec4(one.flux.rgb, 0.5 * footprint * footprint)));
+        vec4(offset, 1.0) * weight, vec4(one.normal_area.xyz, dot(offset, offset)) * weight,
+        vec4(one.flux.rgb, 0.5 * footprint * footprint * weight)));
 }
 
 // The cluster's centroid, relative to the VPL's previous position.
 vec3 cluster_offset(ClusterSums sums) {
-    return sums.offset_count.xyz / max(sums.offset_count.w, 1.0);
+    return sums.offset_count.xyz / max(sums.offset_count.w, 1e-30);
 }
 
 // The cluster's mean direction.

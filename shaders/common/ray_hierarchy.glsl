@@ -1,7 +1,7 @@
 // Ray tracing in compute shaders: the nearest triangle along a ray, through two levels of bounding boxes, a tree over
 // instances above one tree for each mesh.
 //
-// Provides: `ray_hit`, `ray_hit_normal`. Every surface is two-sided. There is no self-intersection offset in here: the
+// Provides: `ray_hit`, `ray_hit_albedo`, `ray_hit_normal`. Every surface is two-sided. There is no self-intersection offset in here: the
 // caller moves the origin off the surface that the ray starts from.
 // Constants: RAY_COUNT_BITS (renderer/gpu/bounding_volumes.py), RAY_STACK_SIZE (renderer/gpu/ray_hierarchy.py).
 // Python: renderer/gpu/ray_hierarchy.py. Test against every triangle in float64: tests/support/traced_rays.py.
@@ -118,6 +118,12 @@ RayHit ray_hit(vec3 origin_world, vec3 direction_world, float longest) {
         }
     }
     return hit;
+}
+
+// Mean albedo of the triangle that was hit.
+vec3 ray_hit_albedo(RayHit hit) {
+    RayTriangle triangle = ray_triangles[hit.triangle];
+    return vec3(triangle.albedo_red, triangle.albedo_green, triangle.albedo_blue);
 }
 
 // Unit normal of the triangle that was hit, in the world, on the side of the ray's origin.

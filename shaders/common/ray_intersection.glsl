@@ -5,11 +5,14 @@
 // The distance of a miss: just below the largest float32, 3.403e38.
 const float RAY_MISS = 3.4e38;
 
-// The corners, in the mesh's own space.
+// The corners, in the mesh's own space, and the mean albedo in [0, 1].
 struct RayTriangle {
     vec3 a;
+    float albedo_red;
     vec3 b;
+    float albedo_green;
     vec3 c;
+    float albedo_blue;
 };
 
 // A ray in the space of an instance. Its direction is not normalised there, so distances along it stay those of the

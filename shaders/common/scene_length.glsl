@@ -6,4 +6,5 @@ layout(std430, binding = FRAME_STATISTICS_BINDING) buffer FrameStatistics {
     float total_flux;     // sum over RSM texels of mean_flux [W]
     float scene_length;   // L: flux-weighted RMS distance of lit texels from their centroid [world units]
     float lit_texels;
+    vec3 light_middle;    // the centroid, relative to `moment_origin` [world units]
 };

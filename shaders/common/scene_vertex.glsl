@@ -15,6 +15,7 @@ struct SceneInstance {
     vec4 base_color;
     ivec4 skinning;        // first influence, first vertex, influences per vertex (0: no skin), first joint
     vec4 alpha;            // opacity, cutoff, 1 if blended, number of the instance
+    vec4 emission;         // radiance [W/(m² sr)]; 1 if both sides emit
 };
 
 layout(std430, binding = SCENE_INSTANCES_BINDING) readonly buffer SceneInstances {

@@ -37,8 +37,10 @@ void main() {
     lit_texels = rest.z;
     // Without light no VPL has flux, and any length will do.
     scene_length = 1.0;
+    light_middle = vec3(0.0);
     if (total_flux > 0.0) {
         vec3 mean_position = flux_position.xyz / total_flux;
+        light_middle = mean_position;
         float variance = rest.x / total_flux - dot(mean_position, mean_position);
         // A single lit point has no extent. The choice of at least 1e-6 of its distance keeps d / L finite.
         scene_length = sqrt(max(variance, 1e-12 * rest.x / total_flux));

@@ -1,11 +1,12 @@
-// VPL gather: indirect irradiance at every pixel, from every VPL or from the pixel's subset of them. VPLs pass through
-// shared memory in batches of 64.
+// VPL gather: irradiance at every pixel, from every VPL of some ranges or from the pixel's subset of them. VPLs pass
+// through shared memory in batches of 64.
 //
 // Reads: G-buffer, VPLs, scene length, artist parameters; visibility maps if VISIBILITY_MAP_SIZE > 0; with
-// LISTED_PIXELS, the pixel list. Writes: irradiance [W/m²]; with INTERLEAVE > 1, the direction that the light comes
-// from.
-// Constants: VPL_DISCS (VPLs are clustered disc lights, else points), LISTED_PIXELS (only pixels of the list, for a
-// full gather), INTERLEAVE. Python: renderer/frame/passes/vpl_gather.py. Twin: tuner/surrogate/vpl_gather.py.
+// LISTED_PIXELS, the pixel list; with GLOWING, the irradiance that this is added to. Writes: irradiance [W/m²]; with
+// INTERLEAVE > 1, the direction that the light comes from.
+// Constants: VPL_RANGES (how many), VPL_DISCS (VPLs are clustered disc lights, else points), GLOWING (they lie on surfaces
+// that glow, whose light no artist parameter changes), LISTED_PIXELS (only pixels of the list, for a full gather),
+// INTERLEAVE. Python: renderer/frame/passes/vpl_gather.py. Twin: tuner/surrogate/vpl_gather.py.
 //
 // Interleaved sampling (Keller and Heidrich 2001): the pixels of an n×n block, n = INTERLEAVE, divide the VPLs among
 // themselves, each VPL n² times as bright. A workgroup takes pixels at one position of their blocks, so all its pixels
@@ -37,7 +38,11 @@ layout(rgba32f, binding = IRRADIANCE_IMAGE) writeonly uniform image2D out_irradi
 layout(rg16, binding = DIRECTION_IMAGE) writeonly uniform image2D out_direction;  // octahedral
 #endif
 
-uniform int vpl_count;
+uniform ivec2 vpl_ranges[VPL_RANGES];  // first VPL and number of each
+
+#if GLOWING
+uniform sampler2D added_irradiance;
+#endif
 
 const int SUBSETS = INTERLEAVE * INTERLEAVE;
 
@@ -54,54 +59,63 @@ ivec2 own_pixel(int subset) {
 
 void main() {
     int subset = int(gl_WorkGroupID.z);
-    // Any run of the R2 sequence is evenly spread, so each subset is a good set of VPLs.
-    int first = subset * vpl_count / SUBSETS;
-    int end = (subset + 1) * vpl_count / SUBSETS;
     ivec2 pixel = own_pixel(subset);
     ivec2 size = imageSize(out_irradiance);
+#if GLOWING
+    FalloffParameters parameters = FalloffParameters(float(SUBSETS), 1.0, 0.0);
+#else
     FalloffParameters parameters = FalloffParameters(
         artist.intensity * float(SUBSETS), artist.falloff_footprint, artist.extinction_coefficient);
+#endif
 #if VISIBILITY_MAP_SIZE > 0
     VisibilityParameters visibility = VisibilityParameters(artist.visibility_bias, artist.visibility_softness);
 #endif
     Receiver receiver = gbuffer_receiver(clamp(pixel, ivec2(0), size - 1));
     vec3 irradiance = vec3(0.0);
     vec3 vector_irradiance = vec3(0.0);  // sum of channels; its dot product with a normal is the irradiance on it
-    for (int start = first; start < end; start += 64) {
-        int lane = int(gl_LocalInvocationIndex);
-        if (start + lane < end) {
-            batch[lane] = virtual_point_lights[start + lane];
-        }
-        barrier();
-        int count = min(64, end - start);
-        for (int i = 0; i < count; ++i) {
-            VirtualPointLight vpl = batch[i];
-            vec3 to_vpl = vpl.position_footprint.xyz - receiver.position_world;
-#if VPL_DISCS
-            vec3 arriving = disc_vector_irradiance(to_vpl, receiver.normal_world, vpl, scene_length, parameters);
-#else
-            vec3 arriving = to_vpl * vpl_falloff(to_vpl, vpl, scene_length, parameters);
-#endif
-            float received = dot(receiver.normal_world, arriving);
-            // About half of all pairs face away from each other: they need no lookup in the map.
-            if (!(received > 0.0)) {
-                continue;
+    for (int range = 0; range < VPL_RANGES; ++range) {
+        // Any run of the R2 sequence is evenly spread, so each subset is a good set of VPLs.
+        int first = vpl_ranges[range].x + subset * vpl_ranges[range].y / SUBSETS;
+        int end = vpl_ranges[range].x + (subset + 1) * vpl_ranges[range].y / SUBSETS;
+        for (int start = first; start < end; start += 64) {
+            int lane = int(gl_LocalInvocationIndex);
+            if (start + lane < end) {
+                batch[lane] = virtual_point_lights[start + lane];
             }
+            barrier();
+            int count = min(64, end - start);
+            for (int i = 0; i < count; ++i) {
+                VirtualPointLight vpl = batch[i];
+                vec3 to_vpl = vpl.position_footprint.xyz - receiver.position_world;
+#if VPL_DISCS
+                vec3 arriving = disc_vector_irradiance(to_vpl, receiver.normal_world, vpl, scene_length, parameters);
+#else
+                vec3 arriving = to_vpl * vpl_falloff(to_vpl, vpl, scene_length, parameters);
+#endif
+                float received = dot(receiver.normal_world, arriving);
+                // About half of all pairs face away from each other: they need no lookup in the map.
+                if (!(received > 0.0)) {
+                    continue;
+                }
 #if VISIBILITY_MAP_SIZE > 0
-            float seen = vpl_visibility(
-                receiver.position_world, receiver.normal_world, vpl,
-                (start + i) * (VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE), scene_length, visibility);
-            received *= seen;
-            arriving *= seen;
+                float seen = vpl_visibility(
+                    receiver.position_world, receiver.normal_world, vpl,
+                    (start + i) * (VISIBILITY_MAP_SIZE * VISIBILITY_MAP_SIZE), scene_length, visibility);
+                received *= seen;
+                arriving *= seen;
 #endif
-            irradiance += vpl.flux.rgb * received;
+                irradiance += vpl.flux.rgb * received;
 #if INTERLEAVE > 1
-            vector_irradiance += arriving * dot(vpl.flux.rgb, vec3(1.0));
+                vector_irradiance += arriving * dot(vpl.flux.rgb, vec3(1.0));
 #endif
+            }
+            barrier();
         }
-        barrier();
     }
     if (pixel.x >= 0 && all(lessThan(pixel, size))) {
+#if GLOWING
+        irradiance += texelFetch(added_irradiance, pixel, 0).rgb;
+#endif
         imageStore(out_irradiance, pixel, receiver.valid ? vec4(irradiance, 1.0) : vec4(0.0));
 #if INTERLEAVE > 1
         bool lit = any(notEqual(vector_irradiance, vec3(0.0)));

@@ -23,10 +23,10 @@ ivec2 data_texel(uint index) {
 }
 
 RayTriangle triangle_at(uint index) {
-    return RayTriangle(
-        texelFetch(ray_triangles, data_texel(3u * index), 0).xyz,
-        texelFetch(ray_triangles, data_texel(3u * index + 1u), 0).xyz,
-        texelFetch(ray_triangles, data_texel(3u * index + 2u), 0).xyz);
+    vec4 a = texelFetch(ray_triangles, data_texel(3u * index), 0);
+    vec4 b = texelFetch(ray_triangles, data_texel(3u * index + 1u), 0);
+    vec4 c = texelFetch(ray_triangles, data_texel(3u * index + 2u), 0);
+    return RayTriangle(a.xyz, a.w, b.xyz, b.w, c.xyz, c.w);
 }
 
 // The distance at which the ray enters a node's box, or RAY_MISS; and the node's child.

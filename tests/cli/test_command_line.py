@@ -93,7 +93,10 @@ REFUSED = {
     "no config": (["render", SCENE, "-o", "a.png", "--config", "no.json"], "no.json: cannot be read"),
     "no scene": (["render", SCENE, "-o", "a.png"], "absent.glb: "),
     "views zero": (["fit", SCENE, "-o", "out", "--views", "0"], "--views: must be from 1 to 64, or a file"),
-    "bounces": (["fit", SCENE, "-o", "out", "--bounces", "3"], "'3' is not one of '1', 'all'"),
+    "bounces": (
+        ["fit", SCENE, "-o", "out", "--bounces", "0"],
+        '--bounces: must be "all" or a whole number from',
+    ),
     "seed": (["fit", SCENE, "-o", "out", "--seed", "-1"], "Invalid value for '--seed'"),
     "export to": (["export", "default", "--to", "hlsl", "-o", "a"], "'hlsl' is not one of 'json', 'glsl'"),
     "fit size": (["fit", SCENE, "-o", "out", "--size", "64"], "--size: must be WxH with sides"),

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from built_scenes import colored_room
 
 from vpltune.cli.program import run
 from vpltune.renderer.export.glb_writer import write_glb
@@ -21,7 +22,8 @@ def check_written(scene_path):
     scene = read_scene(scene_path)
     camera, lights, _ = resolve_camera_and_lights(scene, scene_path, None, None)
     assert run(["init", str(scene_path)]) == 0
-    own_camera, own_lights = read_sidecar(scene_path.with_suffix(".vpltune.toml"))
+    own = read_sidecar(scene_path.with_suffix(".vpltune.toml"))
+    own_camera, own_lights = own.camera, own.lights
     # Fifteen digits are written; the matrix of a look_at is another way to the same.
     np.testing.assert_allclose(own_camera.to_world, camera.to_world, atol=1e-6)
     assert [light.kind for light in own_lights] == [light.kind for light in lights]
@@ -73,3 +75,18 @@ def test_a_pipe_is_no_sidecar(tmp_path, capfd):
     os.mkfifo(tmp_path / "room.vpltune.toml")
     assert run(["render", str(path), "-o", str(tmp_path / "x.png"), "--size", "32x24"]) == 2
     assert "room.vpltune.toml: must be a file" in capfd.readouterr().err
+
+
+def test_a_sidecar_that_is_replaced_keeps_its_sky(tmp_path):
+    write_glb(tmp_path / "room.glb", replace(colored_room(), lights=(), cameras=()))
+    sidecar = tmp_path / "room.vpltune.toml"
+    sidecar.write_text("[sky]\nradiance = 2\n")
+    assert run(["init", str(tmp_path / "room.glb"), "--force"]) == 0
+    kept = read_sidecar(sidecar)
+    assert kept.sky is not None
+    assert kept.sky.radiance == (2.0, 2.0, 2.0)
+    # No light is made up beside a sky.
+    assert kept.lights == ()
+    sidecar.write_text("[sky")
+    assert run(["init", str(tmp_path / "room.glb"), "--force"]) == 0
+    assert len(read_sidecar(sidecar).lights or ()) == 1

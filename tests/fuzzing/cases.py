@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.fuzzing.document_cases import write_config_case, write_sidecar_case, write_views_case
+from tests.fuzzing.environment_cases import write_environment_case
 from tests.fuzzing.gltf_cases import write_gltf_case
 from tests.fuzzing.mitsuba_cases import write_mitsuba_case
 from tests.fuzzing.obj_cases import write_obj_case
@@ -15,6 +16,7 @@ from vpltune.renderer.config.tuned_config import config_text, read_config
 from vpltune.renderer.export.glb_writer import write_glb
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.mitsuba_import import read_mitsuba
+from vpltune.renderer.scene.placement.given_sky import GivenSky
 from vpltune.renderer.scene.placement.scene_sidecar import read_sidecar
 from vpltune.renderer.scene.views import read_views
 
@@ -37,6 +39,11 @@ def _import_mitsuba(path: Path) -> None:
     write_glb(path.with_name("imported.glb"), loaded, notes=loaded.warnings)
 
 
+def _read_environment(path: Path) -> None:
+    """As `--environment` does, turned so that all of the baking is passed through."""
+    GivenSky(file=str(path), rotation_degrees=33.0).environment(None, str(path))
+
+
 def _read_and_write_config(path: Path) -> None:
     """What was read can be written again."""
     config_text(read_config(path))
@@ -53,6 +60,7 @@ READERS: dict[str, Reader] = {
     "ply": Reader(write_ply_case, read_scene),
     "mitsuba": Reader(write_mitsuba_case, _import_mitsuba),
     "sidecar": Reader(write_sidecar_case, read_sidecar),
+    "environment": Reader(write_environment_case, _read_environment),
     "views": Reader(write_views_case, read_views),
     "config": Reader(write_config_case, _read_and_write_config),
     "extras": Reader(write_gltf_case, _export_into_gltf),

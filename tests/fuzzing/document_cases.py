@@ -27,6 +27,7 @@ _SIDECAR: dict[str, Any] = {
         {"type": "point", "position": [0, 1, 0], "intensity": [1.0, 2.0, 3.0]},
         {"type": "directional", "direction": [0.0, -1.0, 0.1], "intensity": 2},
     ],
+    "sky": {"environment": "sky.exr", "scale": 2.0, "rotation": 30.0},
 }
 _SPOT: dict[str, Any] = {
     "type": "spot",

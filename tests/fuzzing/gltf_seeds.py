@@ -96,6 +96,7 @@ def _texture(seed: GltfSeed) -> None:
     move = {"offset": [0.1, 0.2], "scale": [2.0, 1.0], "rotation": 0.3}
     seed.extension(info, "KHR_texture_transform", move)
     material = {"pbrMetallicRoughness": {"baseColorTexture": info, "baseColorFactor": [1, 0.5, 0.5, 1]}}
+    material |= {"emissiveFactor": [1, 0.5, 0], "emissiveTexture": dict(info), "doubleSided": False}
     seed.primitive["material"] = seed.add("materials", material)
     seed.primitive["attributes"]["TEXCOORD_0"] = seed.accessor(seed.uv)
 

@@ -14,6 +14,7 @@ import OpenEXR
 from PIL import Image
 
 from tests.fuzzing.byte_mutations import mutate_bytes
+from tests.fuzzing.environment_cases import hdr_image
 from tests.fuzzing.extremes import DEPTHS, LONGEST_TEXT, STRINGS, number_text
 from tests.fuzzing.gltf_cases import SHARE_LARGE
 
@@ -41,6 +42,7 @@ _XML = """<scene version="3.0.0">
 <shape type="cube"><transform name="to_world"><translate x="1"/></transform><ref id="mixed"/></shape>
 <shape type="sphere"><point name="center" x="-1" y="1"/><float name="radius" value="0.5"/><ref id="wood"/></shape>
 <shape type="disk"><boolean name="flip_normals" value="true"/><emitter type="area"><rgb name="radiance" value="5"/></emitter></shape>
+<shape type="rectangle"><emitter type="area"><texture type="bitmap" name="radiance"><string name="filename" value="map.png"/></texture></emitter></shape>
 <shape type="cylinder"><point name="p0" value="0 0 0"/><point name="p1" value="0 2 0"/><ref id="tiles"/></shape>
 <shape type="obj"><string name="filename" value="mesh.obj"/><boolean name="face_normals" value="true"/><ref id="shade"/></shape>
 <shape type="ply"><string name="filename" value="mesh.ply"/><boolean name="flip_tex_coords" value="true"/>
@@ -52,7 +54,9 @@ _XML = """<scene version="3.0.0">
 <float name="cutoff_angle" value="40"/><float name="beam_width" value="10"/></emitter>
 <emitter type="directional"><vector name="direction" x="0.1" y="-1" z="0"/><spectrum name="irradiance" value="2"/></emitter>
 <emitter type="envmap"><string name="filename" value="sky.exr"/><float name="scale" value="2"/></emitter>
+<emitter type="envmap"><string name="filename" value="sky.hdr"/><transform name="to_world"><rotate x="1" y="1" angle="70"/></transform></emitter>
 <emitter type="constant"/>
+<emitter type="sunsky"/>
 <medium type="homogeneous"/>
 </scene>"""  # noqa: E501
 _OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\nvt 0 0\nvt 1 1\nf 1/1 2/2 3/1\nf 2 4 3\n"
@@ -119,6 +123,7 @@ def write_mitsuba_case(folder: Path, rng: random.Random, mutated: bool) -> Path:
     root.children = [each for each in root.children if each not in left_out]
     image, sky = _images()
     files = {"mesh.obj": _OBJ.encode(), "mesh.ply": _PLY.encode(), "map.png": image, "sky.exr": sky}
+    files["sky.hdr"] = hdr_image(rng)
     choice = rng.random() if mutated else 1.0
     if mutated and rng.random() < SHARE_LARGE:
         # Equal names and ids, each time defined anew.

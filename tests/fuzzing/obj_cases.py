@@ -55,7 +55,8 @@ newmtl wood
 Kd 0.5 0.4 0.3
 map_Kd -s 1 1 1 -o 0 0 0 -clamp off map.png
 Tf 1 1 1
-Ke 0 0 0
+Ke 4 2 1
+map_Ke map.png
 """
 # Keywords and options of both formats that the seeds lack.
 _WORDS = (

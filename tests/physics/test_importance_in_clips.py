@@ -10,8 +10,9 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.clip_state import ClipState
+from vpltune.renderer.frame.drawn_frame import DrawnFrame
 from vpltune.renderer.frame.passes.vpl_importance import LARGEST_LAG
-from vpltune.renderer.frame.runtime import DrawnFrame, Runtime
+from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.light_faces import light_records
 from vpltune.renderer.scene.sun_faces import SunGrid
 from vpltune.renderer.scene.transforms import look_at

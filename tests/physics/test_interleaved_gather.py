@@ -126,7 +126,7 @@ def drawn_gbuffer(gl_context, image, depth_and_normal, light=None) -> Resources:
     height, width = image.shape[:2]
     size = (width, height)
     resources = Resources(gl_context)
-    gbuffer = create_gbuffer(gl_context, size)
+    gbuffer = create_gbuffer(gl_context, size, glows=False)
     depth, normal = depth_and_normal
     gbuffer.depth.write(np.ascontiguousarray(depth[::-1], np.float32).tobytes())
     gbuffer.normal.write(octahedral_texels(normal))

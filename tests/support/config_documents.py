@@ -93,13 +93,12 @@ def any_text() -> st.SearchStrategy[str]:
 def any_document() -> st.SearchStrategy[dict[str, Any]]:
     """A config file of version 2 with any values, without a prior and a checksum."""
     number = st.floats(allow_nan=False, allow_infinity=False) | st.integers(-(10**30), 10**30)
-    plain = st.none() | st.booleans() | number | any_text()
-    light = st.recursive(plain, lambda inner: st.lists(inner, max_size=3), max_leaves=8)
     fit = st.fixed_dictionaries({"status": any_text()}, optional={"sentence": any_text()})
     parts = {
         "visibility": st.sampled_from(VISIBILITIES),
         "quality": any_quality(),
-        "light": st.dictionaries(any_text(), light, max_size=3),
+        # One bounce is the default, and left out when it is written.
+        "light": st.fixed_dictionaries({}, optional={"bounces": st.just("all") | st.integers(2, 64)}),
         "fit": fit,
         "provenance": st.dictionaries(any_text(), any_text() | number, max_size=3),
     }

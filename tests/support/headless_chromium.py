@@ -6,7 +6,7 @@ import shutil
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, Playwright
 
 ARGUMENTS = (
     "--headless",
@@ -23,16 +23,18 @@ ARGUMENTS = (
 
 
 @contextlib.contextmanager
-def headless_chromium(*more: str) -> Iterator[Browser]:
-    """The system's Chromium, started with `more` arguments; skips where there is none to be had."""
+def headless_chromium(playwright: Playwright, *more: str) -> Iterator[Browser]:
+    """The system's Chromium, started with `more` arguments; skips where there is none to be had.
+
+    `playwright` is the fixture of that name: a process cannot start a second one while the first is there.
+    """
     program = shutil.which("chromium")
     if program is None:
         reason = "no chromium; run: apt-get install chromium"
         # Root's set-up installs it, so its absence is a failure; others were told how to get it.
         (pytest.fail if os.geteuid() == 0 else pytest.skip)(reason)
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program, args=[*ARGUMENTS, *more])
-        try:
-            yield browser
-        finally:
-            browser.close()
+    browser = playwright.chromium.launch(executable_path=program, args=[*ARGUMENTS, *more])
+    try:
+        yield browser
+    finally:
+        browser.close()

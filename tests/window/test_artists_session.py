@@ -16,8 +16,8 @@ SETTLED = re.compile("settled")
 
 
 @pytest.fixture
-def page(window):
-    with headless_chromium() as browser:
+def page(window, playwright):
+    with headless_chromium(playwright) as browser:
         # Small, so that the image is; the panel keeps its width.
         page = browser.new_page(viewport={"width": 720, "height": 420})
         page.set_default_timeout(LONGEST)

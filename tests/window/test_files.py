@@ -36,7 +36,8 @@ def test_lights_are_saved_as_the_sidecar_that_the_next_window_reads(window, talk
     talk.look()
     talk.say("save", what="sidecar", path=None)
     assert not talk.message("state")["unsaved_lights"]
-    camera, lights = read_sidecar(scene_file.with_suffix(".vpltune.toml"))
+    saved = read_sidecar(scene_file.with_suffix(".vpltune.toml"))
+    camera, lights = saved.camera, saved.lights
     assert lights is not None and lights[0].intensity.tolist() == [1.0, 2.0, 3.0]
     assert camera is not None
     assert np.allclose(camera.to_world.ravel(), talk.scene["camera"]["to_world"], atol=1e-6)

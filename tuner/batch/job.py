@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from vpltune.renderer.files.atomic_file import write_text_whole
 
@@ -35,9 +35,12 @@ class JobOptions:
     """Start of the fit: the text of a config file."""
     views: int = 4
     seed: int = 0
-    bounces: Literal["1", "all"] = "1"
     size: tuple[int, int] | None = None
     """Width and height of the views in pixels; None for the default of a fit."""
+    sky: tuple[float, float, float] | None = None
+    """Radiance of an even sky in W/(m² sr) for all scenes; None for each scene's own."""
+    environment: str | None = None
+    """Absolute path of an environment map for all scenes; None for each scene's own."""
 
     def fit_options(self, command: str | None) -> "FitOptions":
         """The options as `fit_scene` takes them. `command` is the command line, for the record.
@@ -46,11 +49,17 @@ class JobOptions:
             InputError: `start` is not a valid config.
         """
         from vpltune.renderer.config.tuned_config import parse_config
+        from vpltune.renderer.scene.placement.given_sky import GivenSky
         from vpltune.tuner.scene_fit.fit_scene import FitOptions
 
         start = parse_config(self.start, "the start of the fit")
+        given = self.sky is not None or self.environment is not None
         options = FitOptions(
-            start=start, views=self.views, seed=self.seed, bounces=self.bounces, command=command
+            start=start,
+            views=self.views,
+            seed=self.seed,
+            command=command,
+            sky=GivenSky(self.sky, self.environment) if given else None,
         )
         return options if self.size is None else replace(options, size=self.size)
 
@@ -98,8 +107,10 @@ class Job:
         """The job that `to_json` wrote."""
         document = json.loads(text)
         options = document.pop("options")
-        size = options.pop("size")
-        return cls(**document, options=JobOptions(**options, size=None if size is None else tuple(size)))
+        # JSON has no tuples.
+        for name in ("size", "sky"):
+            options[name] = None if options[name] is None else tuple(options[name])
+        return cls(**document, options=JobOptions(**options))
 
 
 def write_jobs(path: Path, jobs: Sequence[Job]) -> None:

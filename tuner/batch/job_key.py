@@ -22,7 +22,7 @@ from vpltune.renderer.scene.placement.sidecar_file import sidecar_path
 from vpltune.tuner.batch.job import JobOptions
 from vpltune.tuner.batch.referred_files import referred_files
 
-KEY_VERSION = 2
+KEY_VERSION = 3
 """Increase it whenever a code change alters the record of the same inputs. Old records are then ignored."""
 SETTLED_SECONDS = 2.0
 """A digest is not cached if the file changed less than this before it was hashed: within the same tick of the
@@ -89,7 +89,10 @@ def _settings(options: JobOptions) -> str:
     start = parse_config(options.start, "the start of the fit")
     settings = asdict(options) | {"start": start.parameters.as_dict(), "visibility": start.visibility}
     settings["quality"] = start.quality.as_dict()
-    settings["light"] = dict(start.light)
+    settings["light"] = start.light.as_dict()
+    if options.environment is not None:
+        # What is in the file counts, not where it lies.
+        settings["environment"] = _file_digest(Path(options.environment))
     if start.auto is not None:
         settings["auto"] = start.auto.as_dict()
     versions = {name: importlib.metadata.version(name) for name in ("vpltune", "jax", "mitsuba")}

@@ -10,9 +10,10 @@ import stat
 import struct
 import urllib.parse
 from collections.abc import Iterator
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 
+from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.glb_container import GLB_MAGIC
 from vpltune.renderer.scene.files.diagnostics import SceneFileError
 from vpltune.renderer.scene.files.json_object import parse_json
@@ -22,6 +23,7 @@ from vpltune.renderer.scene.files.obj_scene import library_names
 from vpltune.renderer.scene.files.ply_data import LONGEST_HEADER, parse_ply_header
 from vpltune.renderer.scene.files.text_lines import first_word, text_lines
 from vpltune.renderer.scene.mitsuba_import.xml_tree import XmlNode, parse_xml
+from vpltune.renderer.scene.placement.scene_sidecar import sidecar_of
 
 MITSUBA_SUFFIX = ".xml"
 """Extension of a Mitsuba scene."""
@@ -34,10 +36,19 @@ _FILE_NAME = re.compile(r".+\.[A-Za-z0-9]{2,4}")
 
 def referred_files(scene: Path) -> tuple[Path, ...]:
     """Paths of the files that `scene` names, each once, in the order of the file. Some may not exist."""
+    names = chain(_names(scene), _sidecar_names(scene))
     found = dict.fromkeys(
-        path for name in _names(scene) if (path := _inside(scene.parent, name)) is not None and path != scene
+        path for name in names if (path := _inside(scene.parent, name)) is not None and path != scene
     )
     return tuple(found)
+
+
+def _sidecar_names(scene: Path) -> Iterator[str]:
+    """The environment map that the scene's sidecar names."""
+    with contextlib.suppress(InputError):
+        sky = sidecar_of(scene).sky
+        if sky is not None and sky.file is not None:
+            yield sky.file
 
 
 def is_mitsuba_scene(path: Path) -> bool:
@@ -96,7 +107,7 @@ def _obj_names(scene: Path) -> Iterator[str]:
 
 def _map_names(content: bytes, where: str) -> Iterator[str]:
     for _, keyword, rest in mtl_statements(content, where):
-        if keyword.lower() == "map_kd":
+        if keyword.lower() in ("map_kd", "map_ke", "map_d"):
             yield map_statement(rest).path
 
 

@@ -11,7 +11,6 @@ Each share is the relMSE that disappears with its cause, a mean over the fitted 
   that α prevents.
 - `visibility`: error of the tuned image minus that of the ceiling, the same VPLs with ray-traced visibility.
 - `filter`: error of the runtime's image minus that of a plain gather of the same VPLs.
-- `missing_bounces`: error against all bounces minus error against one, if the reference has all bounces.
 - `remainder`: the rest. It is negative if causes overlap, and a share is negative if its cause hides another.
 """
 
@@ -29,9 +28,8 @@ from vpltune.renderer.config.artist_parameters import (
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.evaluation.evaluate import EvaluatedView, Evaluation, surrogate_irradiance
-from vpltune.tuner.evaluation.prepare_scene import PreparedScene, SceneOptions, references_of
+from vpltune.tuner.evaluation.prepare_scene import PreparedScene
 from vpltune.tuner.metrics.view_metrics import relmse
-from vpltune.tuner.reference.reference_view import ReferenceView
 from vpltune.tuner.surrogate.captured_view import CapturedView, runtime_irradiance
 from vpltune.tuner.surrogate.virtual_point_lights import gather_inputs
 from vpltune.tuner.surrogate.vpl_visibility import map_visibility
@@ -46,7 +44,6 @@ _MOST_VPLS = next(spec.high for spec in ARTIST_PARAMETERS if spec.name == "vpl_c
 def error_breakdown(
     prepared: PreparedScene,
     evaluation: Evaluation,
-    options: SceneOptions,
     progress: Callable[[float], None] | None = None,
 ) -> dict[str, float | str]:
     """Split the tuned error by cause; the module's docstring defines the shares.
@@ -54,7 +51,6 @@ def error_breakdown(
     Args:
         prepared: the scene, its runtime and its views.
         evaluation: of `prepared`.
-        options: those that `prepared` was made with.
         progress: called with the share done, in [0, 1].
 
     Returns:
@@ -65,21 +61,16 @@ def error_breakdown(
         MachineError: the GPU ran out of memory or reported an error.
     """
     views = [each for each in evaluation.views if each.view.view.split == "fitted" and each.view.lit]
-    less: tuple[ReferenceView | None, ...] = (None,) * len(views)
-    if options.bounces == "all":
-        less = references_of(prepared.scene, tuple(view.view.view for view in views), options.seed, "1")
     shares: list[dict[str, float]] = []
-    for index, (view, one_bounce) in enumerate(zip(views, less, strict=True)):
-        shares.append(_of_view(prepared.runtime, view, one_bounce))
+    for index, view in enumerate(views):
+        shares.append(_of_view(prepared.runtime, view))
         if progress is not None:
             progress((index + 1) / len(views))
     causes = shares[0] if shares else {}
     return {"views": "fitted"} | {cause: fmean(share[cause] for share in shares) for cause in causes}
 
 
-def _of_view(
-    runtime: Runtime, evaluated: EvaluatedView, one_bounce: ReferenceView | None
-) -> dict[str, float]:
+def _of_view(runtime: Runtime, evaluated: EvaluatedView) -> dict[str, float]:
     view, tuned = evaluated.view, evaluated.tuned
     total = evaluated.metrics["tuned"].relmse
     single, endless = _errors_of_rotations(runtime, view, tuned)
@@ -95,10 +86,6 @@ def _of_view(
         "visibility": total - evaluated.metrics["ceiling"].relmse,
         "filter": total - _error(view, _plain_gather(view, parameters)),
     }
-    if one_bounce is not None:
-        valid = view.valid & one_bounce.valid
-        image, less = evaluated.irradiance["tuned"][valid], one_bounce.irradiance[valid]
-        shares["missing_bounces"] = relmse(image, view.reference.irradiance[valid]) - relmse(image, less)
     return shares | {"remainder": total - sum(shares.values())}
 
 

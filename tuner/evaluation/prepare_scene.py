@@ -6,15 +6,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
 
+from vpltune.renderer.config.light_settings import LightSettings
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.files.reading_border import read_at_border
 from vpltune.renderer.scene.placement import named_cameras, resolve_camera_and_lights, views_for_scene
+from vpltune.renderer.scene.placement.given_sky import GivenSky
 from vpltune.renderer.scene.placement.scene_sidecar import completed_camera_and_lights
+from vpltune.renderer.scene.placement.scene_sky import with_environment
 from vpltune.renderer.scene.scene import Camera, Light, Scene
 from vpltune.renderer.scene.views import SPLITS, View
 from vpltune.renderer.scene.working_scale import require_drawable
@@ -46,14 +48,14 @@ class SceneOptions:
     held_out: int | None = None
     """Number of held-out views; None takes half as many as are fitted, but at least one."""
     seed: int = 0
-    bounces: Literal["1", "all"] = "1"
-    """Bounces of indirect light in the references."""
     camera: Camera | None = None
     """Replaces the camera of the file, of its sidecar or of the automatic placement."""
     camera_name: str | None = None
     """A camera of the file by name or number, or `all` of them, which then share the views."""
     light: Light | None = None
     """Replaces the lights of the file, of its sidecar or of the automatic placement."""
+    sky: GivenSky | None = None
+    """Replaces the environment of the file or of its sidecar."""
     size: tuple[int, int] = VIEW_SIZE
     """Width and height of the views, in pixels."""
     fixed_views: tuple[View, ...] | None = None
@@ -131,18 +133,18 @@ def prepare_scene(
         progress("load", 0.0)
         digest = None
         if isinstance(source, Path):
-            scene = read_scene(source)
+            scene = with_environment(read_scene(source), source, options.sky)
             with source.open("rb") as file:
                 digest = hashlib.file_digest(file, "sha256").hexdigest()
         else:
-            scene = _required_drawable(source)
+            scene = with_environment(_required_drawable(source), None, options.sky)
         views, notes = _views(scene, source, options, validated)
         # Before the references, so that a machine without OpenGL fails at once.
         runtime = Runtime(scene)
         look_first(runtime, views)
     with watch.stage("reference"):
         references = references_of(
-            scene, views, options.seed, options.bounces, lambda share: progress("reference", share)
+            scene, views, options.seed, config.light, lambda share: progress("reference", share)
         )
     with watch.stage("capture"):
         progress("capture", 0.0)
@@ -160,12 +162,13 @@ def references_of(
     scene: Scene,
     views: tuple[View, ...],
     seed: int,
-    bounces: Literal["1", "all"],
+    light: LightSettings,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[ReferenceView, ...]:
     """References of `views` at the noise target of fits and evaluations, from the cache if they are there.
 
-    `progress` is called with the share of all views done, in [0, 1].
+    They have the light that `light` asks for. `progress` is called with the share of all views done, in
+    [0, 1].
     """
     return reference_views(
         scene,
@@ -173,7 +176,7 @@ def references_of(
         seed=seed,
         noise_target=NOISE_TARGET,
         max_samples=MAX_SAMPLES,
-        bounces=1 if bounces == "1" else None,
+        bounces=light.most_bounces,
         progress=None if progress is None else lambda _view, share: progress(share),
     )
 

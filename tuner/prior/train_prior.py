@@ -18,7 +18,7 @@ from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.renderer.gpu.gpu_context import create_context
 from vpltune.renderer.scene.files import read_scene
-from vpltune.renderer.scene.placement import resolve_camera_and_lights
+from vpltune.renderer.scene.placement import resolve_camera_and_lights, with_environment
 from vpltune.renderer.scene.scene import Scene
 from vpltune.tuner.batch.scene_files import library_scenes
 from vpltune.tuner.evaluation.prepare_scene import Progress
@@ -149,7 +149,7 @@ def library_scene(path: Path, name: str) -> Scene:
     Raises:
         InputError: the scene or its sidecar cannot be used.
     """
-    scene = read_scene(path)
+    scene = with_environment(read_scene(path), path)
     camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
     return replace(scene, name=name, cameras=(camera,), lights=lights)
 

@@ -65,7 +65,6 @@ def evaluate_scene(scene_path: Path, options: EvaluateOptions, progress: Progres
             breakdown["error_breakdown"] = error_breakdown(
                 prepared,
                 evaluation,
-                options,
                 lambda share: progress("split error", share),
             )
     notes = (*prepared.notes, *evaluation.notes())

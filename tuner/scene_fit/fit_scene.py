@@ -117,7 +117,7 @@ def fit_scene(
     if options.split_error:
         with watch.stage("split error"):
             breakdown["error_breakdown"] = error_breakdown(
-                prepared, evaluation, options, lambda share: progress("split error", share)
+                prepared, evaluation, lambda share: progress("split error", share)
             )
     config = _config(prepared, found, options)
     views = (*(view.view for view in prepared.views), *(view for view, _ in prepared.validation))
@@ -383,7 +383,7 @@ def _config(prepared: PreparedScene, found: _Found, options: FitOptions) -> Tune
         "jax": importlib.metadata.version("jax"),
         "views": options.views,
         "seed": options.seed,
-        "bounces": options.bounces,
+        "bounces": options.start.light.bounces,
     }
     chosen = options.start if _keeps_prior(found, options) else found.config
     return replace(chosen, provenance=provenance, fit=FitNote(found.status, found.sentence))

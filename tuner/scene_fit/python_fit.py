@@ -40,7 +40,7 @@ def fit(
             each [receivers, 3], that returns one number.
         config: where the fit begins: a config, a config file, "default" or "auto".
         progress: called with the name of a stage and the share of it that is done, in [0, 1].
-        options: other fields of `FitOptions`: seed, bounces, camera, light, size, held_out, budget, motion …
+        options: other fields of `FitOptions`: seed, camera, light, size, held_out, budget, motion …
 
     Raises:
         InputError: the config, the scene, its sidecar, a view or the output folder cannot be used, or the

@@ -23,6 +23,7 @@ from vpltune.cli.options import (
     parse_size,
 )
 from vpltune.cli.report import OK, PARTLY_DONE, Report, warn
+from vpltune.cli.view_options import EnvironmentOption, SkyOption
 from vpltune.guard import asked_to_stop
 from vpltune.renderer.errors import InputError
 
@@ -57,7 +58,9 @@ def batch(
     size: ViewSizeOption = None,
     seed: SeedOption = 0,
     visibility: VisibilityOption = None,
-    bounces: BouncesOption = "1",
+    bounces: BouncesOption = None,
+    sky: SkyOption = None,
+    environment: EnvironmentOption = None,
     workers: Annotated[
         int | None,
         typer.Option(
@@ -118,19 +121,24 @@ def batch(
     from vpltune.cli.batch_display import shown_batch
     from vpltune.cli.command_line import command_line
     from vpltune.cli.quality_flags import with_flags
+    from vpltune.cli.view_flags import sky_from_flags
     from vpltune.renderer.config.tuned_config import config_text, read_config
     from vpltune.renderer.files.atomic_file import require_writable
     from vpltune.tuner.batch.batch import run_batch
     from vpltune.tuner.batch.job import JobOptions
 
-    start, overridden = with_flags(read_config(config), visibility=visibility)
+    start, overridden = with_flags(read_config(config), visibility=visibility, bounces=bounces)
     warn(overridden)
+    given = sky_from_flags(sky, environment)
+    if given is not None:
+        given.environment(None, "--environment")  # one line now, not one for each scene
     options = JobOptions(
         start=config_text(start),
         views=views,
         seed=seed,
-        bounces=bounces,
         size=None if size is None else parse_size(size),
+        sky=None if given is None else given.radiance,
+        environment=None if given is None or given.file is None else str(Path(given.file).resolve()),
     )
     if scheduler is not None and slurm is not None:
         raise InputError("--scheduler and --slurm: only one of them can be given")

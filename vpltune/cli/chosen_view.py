@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING
 
 from vpltune.cli.options import parse_size
 from vpltune.cli.report import warn
-from vpltune.cli.view_flags import camera_from_flags, light_from_flags
+from vpltune.cli.view_flags import camera_from_flags, light_from_flags, sky_from_flags
 from vpltune.cli.view_options import ViewFlags
 from vpltune.renderer.errors import InputError
-from vpltune.renderer.scene.placement import named_camera, resolve_camera_and_lights
+from vpltune.renderer.scene.files import read_scene
+from vpltune.renderer.scene.placement import named_camera, resolve_camera_and_lights, with_environment
+from vpltune.renderer.scene.placement.given_sky import GivenSky
 from vpltune.renderer.scene.scene import Camera, Light
 from vpltune.renderer.scene.views import View, read_views
 from vpltune.renderer.scene.working_scale import require_drawable
@@ -35,6 +37,18 @@ class ChosenView:
     """None if no light was given."""
     size: tuple[int, int]
     """Width and height of the image, in pixels."""
+    sky: GivenSky | None = None
+    """None if no sky was given."""
+
+    def read(self, scene_path: Path) -> "Scene":
+        """The scene of a file, in the sky that was given or that its sidecar has; with the file's warnings.
+
+        Raises:
+            InputError: a file cannot be used.
+        """
+        scene = read_scene(scene_path)
+        warn(scene.warnings)
+        return with_environment(scene, scene_path, self.sky)
 
     def placed(self, scene: "Scene", scene_path: Path) -> View:
         """The view of a scene, with warnings about what was chosen.
@@ -64,7 +78,14 @@ def chosen_view(views: Path | None, name: str | None, size: str | None, flags: V
     from_file = _view_from_file(views, name, flags)
     unasked = DEFAULT_SIZE if from_file is None else from_file.size
     pixels = unasked if size is None else parse_size(size)
-    return ChosenView(from_file, camera_from_flags(flags), flags.camera, light_from_flags(flags), pixels)
+    return ChosenView(
+        from_file,
+        camera_from_flags(flags),
+        flags.camera,
+        light_from_flags(flags),
+        pixels,
+        sky_from_flags(flags.sky, flags.environment),
+    )
 
 
 def _view_from_file(path: Path | None, name: str | None, flags: ViewFlags) -> View | None:
@@ -72,7 +93,7 @@ def _view_from_file(path: Path | None, name: str | None, flags: ViewFlags) -> Vi
         if name is not None:
             raise InputError("--view: names a view of --views FILE, which is missing")
         return None
-    if flags != ViewFlags():
+    if flags.place_a_view:
         raise InputError("--views: has its own camera and lights; leave out the camera and light flags")
     found = read_views(path)
     names = [view.name for view in found]

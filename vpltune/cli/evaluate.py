@@ -32,7 +32,7 @@ def evaluate(
     ] = str(VIEW_COUNT),
     seed: SeedOption = 0,
     visibility: VisibilityOption = None,
-    bounces: BouncesOption = "1",
+    bounces: BouncesOption = None,
     split_error: SplitErrorOption = False,
     *,
     flags: ViewFlags,
@@ -44,22 +44,22 @@ def evaluate(
     from vpltune.cli.metrics_table import error_breakdown_table, metrics_table
     from vpltune.cli.progress_display import shown_progress
     from vpltune.cli.quality_flags import with_flags
-    from vpltune.cli.view_flags import camera_from_flags, light_from_flags
+    from vpltune.cli.view_flags import camera_from_flags, light_from_flags, sky_from_flags
     from vpltune.cli.views_or_file import views_or_file
     from vpltune.renderer.config.tuned_config import read_config
     from vpltune.tuner.scene_fit.evaluate_scene import EvaluateOptions, evaluate_scene
 
-    tuned, overridden = with_flags(read_config(config), visibility=visibility)
+    tuned, overridden = with_flags(read_config(config), visibility=visibility, bounces=bounces)
     warn(overridden)
     options = EvaluateOptions(
         tuned=tuned,
         seed=seed,
-        bounces=bounces,
         split_error=split_error,
         camera=camera_from_flags(flags),
         light=light_from_flags(flags),
+        sky=sky_from_flags(flags.sky, flags.environment),
         camera_name=flags.camera,
-        **_views_option(views_or_file(views, flags != ViewFlags())),
+        **_views_option(views_or_file(views, flags.place_a_view)),
     )
     with shown_progress() as progress:
         document = evaluate_scene(scene, options, progress).document

@@ -144,10 +144,8 @@ def _write(
 
 def _bundle(config: "TunedConfig", scene: Path, chosen: "ChosenView") -> "SceneBundle":
     from vpltune.renderer.export.scene_bundle import scene_bundle
-    from vpltune.renderer.scene.files import read_scene
 
-    loaded = read_scene(scene)
-    warn(loaded.warnings)
+    loaded = chosen.read(scene)
     drawn = chosen.placed(loaded, scene)
     if loaded.animation is not None:
         warn(("the scene's animation is left out: the scene is exported at rest",))

@@ -65,7 +65,7 @@ def fit(
         bool,
         typer.Option("--motion", help="Accept a fit only if it flickers no more than the start."),
     ] = False,
-    bounces: BouncesOption = "1",
+    bounces: BouncesOption = None,
     split_error: SplitErrorOption = False,
     *,
     flags: ViewFlags,
@@ -75,13 +75,13 @@ def fit(
     from vpltune.cli.budget_flags import budget_from_flags, with_vpl_count
     from vpltune.cli.progress_display import shown_progress
     from vpltune.cli.quality_flags import with_flags
-    from vpltune.cli.view_flags import camera_from_flags, light_from_flags
+    from vpltune.cli.view_flags import camera_from_flags, light_from_flags, sky_from_flags
     from vpltune.cli.views_or_file import views_or_file
     from vpltune.renderer.config.tuned_config import read_config
     from vpltune.tuner.scene_fit.fit_scene import FitOptions, fit_scene
 
-    given = views_or_file(views, flags != ViewFlags())
-    start, overridden = with_flags(read_config(config), visibility=visibility)
+    given = views_or_file(views, flags.place_a_view)
+    start, overridden = with_flags(read_config(config), visibility=visibility, bounces=bounces)
     warn(overridden)
     options = FitOptions(
         start=with_vpl_count(start, vpl_count),
@@ -90,11 +90,11 @@ def fit(
         views=given if isinstance(given, int) else len(given[1]),
         fixed_views=None if isinstance(given, int) else given[1],
         seed=seed,
-        bounces=bounces,
         split_error=split_error,
         camera=camera_from_flags(flags),
         camera_name=flags.camera,
         light=light_from_flags(flags),
+        sky=sky_from_flags(flags.sky, flags.environment),
         command=command_line(),
     )
     if size is not None:

@@ -1,13 +1,19 @@
 """`vpltune import`: converts a scene of another renderer to a self-contained .glb."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vpltune.cli.options import JsonOption
 from vpltune.cli.report import Report, warn
 from vpltune.renderer.errors import InputError
+
+if TYPE_CHECKING:
+    from vpltune.renderer.scene.environment import Environment
+
+ENVIRONMENT_SUFFIX = ".environment.exr"
+"""What takes the place of .glb in the name of the environment's file."""
 
 
 def import_scene(
@@ -17,7 +23,10 @@ def import_scene(
     output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="The .glb to write.")],
     json: JsonOption = False,
 ) -> Report:
-    """Convert a Mitsuba scene to a .glb: camera, lights, diffuse materials, triangles, textures."""
+    """Convert a Mitsuba scene to a .glb: camera, lights, diffuse materials, triangles, textures.
+
+    glTF has no environments: one is written beside the .glb, and named in its sidecar.
+    """
     from rich.markup import escape
 
     if scene.suffix.lower() != ".xml":
@@ -28,10 +37,12 @@ def import_scene(
     from vpltune.renderer.export.glb_writer import write_glb
     from vpltune.renderer.files.atomic_file import require_writable
     from vpltune.renderer.scene.mitsuba_import import read_mitsuba
+    from vpltune.renderer.scene.placement.sidecar_file import sidecar_path
 
     require_writable(output.parent)
     loaded = read_mitsuba(scene)
     warn(loaded.warnings)
+    sky = None if loaded.environment is None else _write_environment(loaded.environment, output)
     write_glb(output, loaded, notes=loaded.warnings)
     document = {
         "scene": str(scene),
@@ -41,6 +52,7 @@ def import_scene(
         "textures": len(loaded.textures),
         "lights": len(loaded.lights),
         "cameras": len(loaded.cameras),
+        "environment": sky,
         "approximated": list(loaded.warnings),
         "status": "ok",
     }
@@ -48,4 +60,24 @@ def import_scene(
         f"wrote {escape(str(output))} ({document['triangles']:,} triangles, {document['lights']} lights, "
         f"{document['cameras']} cameras)"
     )
-    return Report(document, (shown,))
+    beside = () if sky is None else (f"wrote {escape(sky)} and {escape(str(sidecar_path(output)))}",)
+    return Report(document, (shown, *beside))
+
+
+def _write_environment(environment: "Environment", output: Path) -> str:
+    """Write the environment beside the .glb, and name it in the .glb's sidecar; returns its path.
+
+    A sidecar that is there keeps its camera and lights.
+    """
+    from vpltune.renderer.files.atomic_file import write_text_whole
+    from vpltune.renderer.files.image_file import write_exr
+    from vpltune.renderer.scene.placement.given_sky import GivenSky
+    from vpltune.renderer.scene.placement.scene_sidecar import sidecar_of
+    from vpltune.renderer.scene.placement.sidecar_file import sidecar_path, sidecar_text
+
+    there = sidecar_of(output)
+    image = output.with_suffix(ENVIRONMENT_SUFFIX)
+    write_exr(image, environment.radiance)
+    text = sidecar_text(there.camera, there.lights, GivenSky(file=image.name))
+    write_text_whole(sidecar_path(output), text)
+    return str(image)

@@ -25,7 +25,6 @@ SCENE_SECONDS = 900.0
 
 Layer = Literal["final", "direct", "indirect", "irradiance", "albedo", "normal", "depth"]
 Motion = Literal["auto", "none", "light", "camera", "both"]
-Bounces = Literal["1", "all"]
 
 SceneArgument = Annotated[
     Path, typer.Argument(metavar="SCENE", help="A .gltf, .glb, .obj or .ply file.", show_default=False)
@@ -94,7 +93,20 @@ ViewCountOption = Annotated[
     ),
 ]
 BouncesOption = Annotated[
-    Bounces, typer.Option(help="Indirect light of the reference: one bounce, or all of them.")
+    str | None,
+    typer.Option(
+        metavar="N|all",
+        help="Reflections of light, at most: 1 to 64, or all of them; overrides the config.",
+        show_default=False,
+    ),
+]
+SkyLightsOption = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N",
+        help="Directional lights that stand for a sky, from 1 to 256; overrides the config.",
+        show_default=False,
+    ),
 ]
 ViewSizeOption = Annotated[
     str | None,

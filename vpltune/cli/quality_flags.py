@@ -1,23 +1,26 @@
-"""Flags that override a config: `--visibility` and the quality settings."""
+"""Flags that override a config: `--visibility`, the quality settings and those of the light."""
 
 from dataclasses import replace
 from typing import Any
 
+from vpltune.renderer.config.light_settings import LightSettings
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, Visibility
 from vpltune.renderer.errors import InputError
 
+_LIGHT = tuple(LightSettings.__dataclass_fields__)
+
 
 def with_flags(
-    config: TunedConfig, *, visibility: Visibility | None = None, **quality: int | str | None
+    config: TunedConfig, *, visibility: Visibility | None = None, **settings: int | str | None
 ) -> tuple[TunedConfig, tuple[str, ...]]:
     """Override values of a config by flags.
 
     Args:
         config: the config that was read.
         visibility: None keeps the config's own.
-        quality: fields of `Quality`, as numbers or as words of the command line; None keeps the config's
-            own.
+        settings: fields of `Quality` and `LightSettings`, as numbers or as words of the command line; None
+            keeps the config's own.
 
     Returns:
         The config, and a sentence for each value other than the default that a flag overrides.
@@ -28,16 +31,20 @@ def with_flags(
     """
     given: dict[str, Any] = {
         name: int(value) if isinstance(value, str) and _is_number(value) else value
-        for name, value in quality.items()
+        for name, value in settings.items()
         if value is not None
     }
     for name, value in given.items():
         try:
-            Quality.validated({name: value}, "quality")
+            part = LightSettings if name in _LIGHT else Quality
+            part.validated({name: value}, "config")
         except InputError as error:
             rule = str(error).partition(": ")[2]
             raise InputError(f"--{name.replace('_', '-')}: {rule}") from error
-    own = {"visibility": config.visibility, **{name: getattr(config.quality, name) for name in given}}
+    own = {
+        "visibility": config.visibility,
+        **{name: getattr(config.light if name in _LIGHT else config.quality, name) for name in given},
+    }
     asked = {**({} if visibility is None else {"visibility": visibility}), **given}
     notes = tuple(
         f"--{name.replace('_', '-')} {value} overrides the config, which has {own[name]}"
@@ -45,9 +52,13 @@ def with_flags(
         if own[name] != value and not _is_default(name, own[name])
     )
     changed = config.seen_by(visibility)
+    light = {name: given.pop(name) for name in _LIGHT if name in given}
     if given:
+        changed = replace(changed, quality=replace(changed.quality, **given))
+    if given or light:
         # The budget was met with other settings.
-        changed = replace(changed, quality=replace(changed.quality, **given, budget=None))
+        quality = replace(changed.quality, budget=None)
+        changed = replace(changed, quality=quality, light=replace(changed.light, **light))
     return changed, notes
 
 
@@ -58,4 +69,6 @@ def _is_number(text: str) -> bool:
 
 def _is_default(name: str, value: object) -> bool:
     """Whether `value` is what a config without this key has."""
-    return getattr(TunedConfig(), name, getattr(Quality(), name, None)) == value
+    default = TunedConfig()
+    parts = (default, default.quality, default.light)
+    return next(getattr(part, name) for part in parts if hasattr(part, name)) == value

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vpltune.cli.options import (
+    BouncesOption,
     InterleaveOption,
     JsonOption,
     Layer,
@@ -15,6 +16,7 @@ from vpltune.cli.options import (
     Motion,
     RsmResolutionOption,
     SceneArgument,
+    SkyLightsOption,
     VisibilityOption,
     checked_scale,
 )
@@ -65,6 +67,8 @@ def render(
     map_size: MapSizeOption = None,
     map_refinement: MapRefinementOption = None,
     rsm_resolution: RsmResolutionOption = None,
+    bounces: BouncesOption = None,
+    sky_lights: SkyLightsOption = None,
     dynamic_lights: Annotated[
         int,
         typer.Option(metavar="N", min=0, max=LARGEST_DYNAMIC_LIGHT_COUNT, help="Add N small moving lights."),
@@ -107,17 +111,17 @@ def render(
         map_size=map_size,
         map_refinement=map_refinement,
         rsm_resolution=rsm_resolution,
+        bounces=bounces,
+        sky_lights=sky_lights,
     )
     warn(overridden)
 
     from vpltune.renderer.frame.runtime import Runtime
-    from vpltune.renderer.scene.files import read_scene
     from vpltune.renderer.scene.scene import scaled
     from vpltune.renderer.scene.sequence import Sequence
     from vpltune.renderer.scene.views import scaled_view
 
-    loaded = read_scene(scene)
-    warn(loaded.warnings)
+    loaded = chosen.read(scene)
     drawn = chosen.placed(loaded, scene)
     sequence = Sequence(loaded, drawn, motion, factor)
     if factor != 1.0:

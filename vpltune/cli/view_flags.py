@@ -1,6 +1,7 @@
-"""Camera and light from flags, and the rules for which flags may be given together."""
+"""Camera, light and sky from flags, and the rules for which flags may be given together."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float64
@@ -8,6 +9,9 @@ from jaxtyping import Float64
 from vpltune.cli.options import parse_numbers
 from vpltune.cli.view_options import ViewFlags
 from vpltune.renderer.errors import InputError
+from vpltune.renderer.scene.files.environment_file import ENVIRONMENT_SUFFIXES, is_environment_file
+from vpltune.renderer.scene.files.limits import LARGEST_RADIOMETRIC
+from vpltune.renderer.scene.placement.given_sky import GivenSky
 from vpltune.renderer.scene.scene import Camera, Light
 from vpltune.renderer.scene.spot_cone import checked_cone
 from vpltune.renderer.scene.transforms import look_at
@@ -71,6 +75,30 @@ def light_from_flags(flags: ViewFlags) -> Light | None:
         return Light("directional", intensity, direction_world=_direction(flags), name="from flags")
     inner, outer = _cone(flags.light_cone)
     return Light("spot", intensity, _position(flags), _direction(flags), inner, outer, name="from flags")
+
+
+def sky_from_flags(sky: str | None, environment: Path | None) -> GivenSky | None:
+    """The sky of `--sky` or `--environment`; None if neither is given.
+
+    Raises:
+        InputError: both are given, or a value is out of range.
+    """
+    if sky is not None and environment is not None:
+        raise InputError("--sky and --environment: only one of them can be given")
+    if environment is not None:
+        if not is_environment_file(environment.name):
+            raise InputError(
+                f"--environment: must end in {' or '.join(ENVIRONMENT_SUFFIXES)}, "
+                f"got {str(environment)!r:.60}"
+            )
+        return GivenSky(file=str(environment))
+    if sky is None:
+        return None
+    numbers = parse_numbers(sky, "--sky", (1, 3))
+    if min(numbers) < 0.0 or max(numbers) > LARGEST_RADIOMETRIC:
+        raise InputError(f"--sky: must be from 0 to {LARGEST_RADIOMETRIC:g}, got {sky:.60}")
+    red, green, blue = numbers * (3 // len(numbers))
+    return GivenSky((red, green, blue))
 
 
 def _vector(text: str, flag: str) -> Float64[np.ndarray, "3"]:

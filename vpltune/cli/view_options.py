@@ -3,7 +3,7 @@
 import functools
 import inspect
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -24,9 +24,18 @@ def _view_option(metavar: str, description: str) -> typer.models.OptionInfo:
     return typer.Option(metavar=metavar, help=description, show_default=False, rich_help_panel=VIEW_PANEL)
 
 
+SkyOption = Annotated[
+    str | None,
+    _view_option("L or R,G,B", "Radiance of an even sky in W/(m² sr), in place of the scene's; 0 for none."),
+]
+EnvironmentOption = Annotated[
+    Path | None, _view_option("FILE", "An equirectangular map of the sky, .exr or .hdr.")
+]
+
+
 @dataclass(frozen=True)
 class ViewFlags:
-    """Camera and light as given on the command line; None if a flag is absent."""
+    """Camera, light and sky as given on the command line; None if a flag is absent."""
 
     camera: Annotated[
         str | None, _view_option("NAME", "A camera of the file, by name or number; for fits also `all`.")
@@ -46,6 +55,13 @@ class ViewFlags:
     light_cone: Annotated[
         str | None, _view_option("INNER,OUTER", "Half angles of a spot, in degrees. [0,45]")
     ] = None
+    sky: SkyOption = None
+    environment: EnvironmentOption = None
+
+    @property
+    def place_a_view(self) -> bool:
+        """Whether a flag of camera or light is given, which a views.json has of its own."""
+        return replace(self, sky=None, environment=None) != ViewFlags()
 
 
 def takes_view_flags(command: Callable[..., Report]) -> Callable[..., Report]:

@@ -1,29 +1,36 @@
-"""Clustered disc lights: VPLs that each take the light of the RSM samples nearest to them."""
+"""Clustered disc lights: VPLs that each take the light of the samples nearest to them."""
 
-from vpltune.renderer.frame.disc_samples import DEFINES, sample_count
+from vpltune.renderer.config.artist_parameters import parameter_spec
+from vpltune.renderer.frame.disc_samples import DEFINES
 from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
+from vpltune.renderer.frame.vpl_pools import VPL_BYTES, DiscPool
 from vpltune.renderer.gpu.gpu_program import ComputeProgram
 from vpltune.renderer.gpu.resources import Resources
 
 
 class ClusteredDiscsPass(FramePass):
-    """RSM samples → the VPLs, after `lloyd_iterations` of Lloyd (1982).
+    """The samples of one pool → its VPLs, after `lloyd_iterations` of Lloyd (1982).
 
     Dong et al. 2009 ("Interactive indirect illumination using clustered visibility") make virtual area lights
     from RSMs alike. With few VPLs the point approximation dominates the error; a cluster shines as a disc of
     its spread (`shaders/common/vpl_disc.glsl`).
+
+    The first pool's VPLs may be points instead. Others have no density that points could be drawn by, and are
+    always clustered.
     """
 
     name = "clustered_discs"
 
-    def __init__(self, resources: Resources, vpl_count: int):
+    def __init__(self, resources: Resources, pool: DiscPool):
         self._resources = resources
-        self._vpl_count = vpl_count
+        self._pool = pool
         self._programs: tuple[ComputeProgram, ComputeProgram, ComputeProgram] | None = None
+        if pool.vpls not in resources:
+            resources[pool.vpls] = resources.context.buffer(reserve=pool.vpl_count * VPL_BYTES)
 
     def wanted(self, inputs: FrameInputs) -> bool:
         """Where VPLs are discs."""
-        return inputs.parameters.vpls_are_discs
+        return inputs.parameters.vpls_are_discs or self._pool.name != "first"
 
     def draw(self, inputs: FrameInputs) -> None:
         """Cluster. VPLs start at the first samples, and in a clip where the frame before left them.
@@ -32,48 +39,53 @@ class ClusteredDiscsPass(FramePass):
         samples in a clip, as after a cut, starts anew alone.
         """
         restart, owners, discs = self._programs or self._compiled()
-        count, samples, state = self._vpl_count, sample_count(self._vpl_count), inputs.state
+        pool, state, resources = self._pool, inputs.state, self._resources
+        count, samples = pool.vpl_count, pool.sample_count
         if state is None:
-            self._resources.copy("vpl_samples", "virtual_point_lights")
+            resources.copy(pool.samples, pool.vpls)
         else:
-            size = self._resources.buffer("virtual_point_lights").size
-            carried = state.buffer(self._resources.context, f"clustered_discs_{count}", size)
-            self._resources["carried_discs"] = carried
-            self._resources.copy("carried_discs", "virtual_point_lights")
-        for _ in range(inputs.parameters.lloyd_iterations):
+            size = resources.buffer(pool.vpls).size
+            carried = state.buffer(resources.context, f"{pool.vpls}_{count}", size)
+            resources["carried_discs"] = carried
+            resources.copy("carried_discs", pool.vpls)
+        iterations = inputs.parameters.lloyd_iterations or int(parameter_spec("lloyd_iterations").default)
+        for _ in range(iterations):
             if state is not None:
                 restart.dispatch(-(-count // 64), vpl_count=count)
             owners.dispatch(-(-samples // 64), vpl_count=count, sample_count=samples)
             discs.dispatch(count, sample_count=samples)
         if state is not None:
-            self._resources.copy("virtual_point_lights", "carried_discs")
+            resources.copy(pool.vpls, "carried_discs")
 
     def _compiled(self) -> tuple[ComputeProgram, ComputeProgram, ComputeProgram]:
         """Compiled when they are first needed: points need none."""
-        resources, defines = self._resources, DEFINES
-        words = self._vpl_count * -(-sample_count(self._vpl_count) // 32)
-        resources["vpl_members"] = resources.context.buffer(bytes(4 * words))
+        resources, defines, pool = self._resources, DEFINES, self._pool
+        words = pool.vpl_count * -(-pool.sample_count // 32)
+        resources[pool.members] = resources.context.buffer(bytes(4 * words))
+        samples = f"{pool.samples} as vpl_samples"
+        vpls = f"{pool.vpls} as virtual_point_lights"
+        members = f"{pool.members} as vpl_members"
         self._programs = (
             ComputeProgram(
                 resources,
                 "clustered_discs/clustered_discs_restart",
                 {},
-                reads=("vpl_samples",),
-                writes=("virtual_point_lights",),
+                reads=(samples,),
+                writes=(vpls,),
             ),
             ComputeProgram(
                 resources,
                 "clustered_discs/clustered_discs_owners",
                 defines,
-                reads=("frame_statistics", "vpl_samples", "virtual_point_lights"),
-                writes=("vpl_members",),
+                reads=("frame_statistics", samples, vpls),
+                writes=(members,),
             ),
             ComputeProgram(
                 resources,
                 "clustered_discs/clustered_discs",
                 defines,
-                reads=("frame_statistics", "vpl_samples"),
-                writes=("virtual_point_lights", "vpl_members"),
+                reads=("frame_statistics", samples),
+                writes=(vpls, members),
             ),
         )
         return self._programs

@@ -12,22 +12,24 @@ from vpltune.renderer.gpu.resources import Resources
 
 
 class DirectLightPass(FramePass):
-    """G-buffer, RSM, light accumulation → direct irradiance.
+    """G-buffer, RSM, light accumulation → irradiance of the punctual lights, in the texture `target`.
 
     `shadow_reads` names the shadow maps of a scene with blended surfaces.
     """
 
     name = "direct_light"
 
-    def __init__(self, resources: Resources, rsm: ReflectiveShadowMap, shadow_reads: tuple[str, ...] = ()):
+    def __init__(
+        self, resources: Resources, rsm: ReflectiveShadowMap, target: str, shadow_reads: tuple[str, ...] = ()
+    ):
         self._rsm = rsm
-        self._groups = pixel_groups(resources.texture("direct_irradiance"))
+        self._groups = pixel_groups(resources.texture(target))
         self._program = ComputeProgram(
             resources,
             "direct_light/direct_light",
             {"RSM_RESOLUTION": rsm.resolution, **({"HAS_BLENDED": 1} if shadow_reads else {})},
             reads=(*GBUFFER_READS, *RSM_READS, *shadow_reads, "light_accumulation"),
-            writes=("direct_irradiance as irradiance",),
+            writes=(f"{target} as irradiance",),
         )
 
     def draw(self, inputs: FrameInputs) -> None:

@@ -10,14 +10,20 @@ from vpltune.renderer.gpu.scene_program import scene_programs
 
 
 class GeometryPass(FramePass):
-    """Scene, camera → G-buffer (depth, shading normal, albedo)."""
+    """Scene, camera → G-buffer (depth, shading normal, albedo; emission where surfaces glow)."""
 
     name = "geometry"
 
     def __init__(self, resources: Resources, scene: SceneBuffers, gbuffer: GBuffer):
         self._context = resources.context
         self._gbuffer = gbuffer
-        self._programs = scene_programs(resources, scene, "geometry/geometry")
+        self._programs = scene_programs(
+            resources,
+            scene,
+            "geometry/geometry",
+            ("emission_texture",) if scene.glows else (),
+            {"GLOWS": scene.glows},
+        )
 
     def draw(self, inputs: FrameInputs) -> None:
         """Fill the G-buffer."""

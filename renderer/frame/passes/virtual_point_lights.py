@@ -1,17 +1,19 @@
 """Virtual point lights drawn from the RSM on the GPU: density over texels, then a warped point table."""
 
+import numpy as np
+from jaxtyping import Float32
+
 from vpltune.renderer.frame.disc_samples import sample_count
 from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
 from vpltune.renderer.frame.point_table import PointTable, point_table, r2_sequence
+from vpltune.renderer.frame.vpl_pools import VPL_BYTES
 from vpltune.renderer.gpu.gpu_program import ComputeProgram
 from vpltune.renderer.gpu.render_targets import RSM_READS, ReflectiveShadowMap
 from vpltune.renderer.gpu.resources import Resources
 
 ROW_GROUP_SIZE = 64
 """Invocations that sum one row of the atlas. A choice."""
-VPL_BYTES = 48
-"""Bytes of a VPL: `shaders/common/virtual_point_lights.glsl`."""
-FRAME_STATISTICS_BYTES = 16
+FRAME_STATISTICS_BYTES = 32
 """Bytes of `shaders/common/scene_length.glsl`."""
 _ROW_MOMENTS_BYTES = 32
 """Bytes of a row in shaders/virtual_point_lights/vpl_row_density.comp."""
@@ -62,6 +64,16 @@ class VirtualPointLightsPass(FramePass):
     """RSM atlas, its density → `count` VPLs, or for clustered discs the samples that they are made of.
 
     Each has flux and area of the `rsm_filtering`² texels around its own, in the mean; an odd number.
+
+    Args:
+        resources: holds the RSM and its density.
+        rsm: its layout.
+        count: VPLs.
+        table: from which points are taken.
+        rsm_filtering: see above.
+        importance_cells: along the side of a face.
+        walk_starts: in [0, 1)², one for each walk of light that starts at a place the RSM shows; None for no
+            walks.
     """
 
     name = "virtual_point_lights"
@@ -74,6 +86,7 @@ class VirtualPointLightsPass(FramePass):
         table: PointTable,
         rsm_filtering: int,
         importance_cells: int,
+        walk_starts: Float32[np.ndarray, "walks 2"] | None = None,
     ):
         self._resources = resources
         self._rsm = rsm
@@ -85,20 +98,27 @@ class VirtualPointLightsPass(FramePass):
         }
         context = resources.context
         resources["point_table"] = context.buffer(point_table(table, count).tobytes())
-        resources["virtual_point_lights"] = context.buffer(reserve=count * VPL_BYTES)
-        self._vpls = self._program("point_table", "virtual_point_lights")
+        resources["first_vpls"] = context.buffer(reserve=count * VPL_BYTES)
+        self._vpls = self._program("point_table", "first_vpls")
         self._samples: ComputeProgram | None = None
+        self._walks = 0 if walk_starts is None else len(walk_starts)
+        if walk_starts is not None:
+            resources["lamp_starts"] = context.buffer(reserve=self._walks * VPL_BYTES)
+            resources["lamp_table"] = context.buffer(np.ascontiguousarray(walk_starts).tobytes())
+            self._starts = self._program("lamp_table", "lamp_starts")
 
     def draw(self, inputs: FrameInputs) -> None:
-        """Place the VPLs, or the samples that the discs are made of."""
+        """Place the VPLs, or the samples that the discs are made of; and where walks start."""
+        if self._walks:
+            self._dispatch(self._starts, self._walks, inputs)
         if not inputs.parameters.vpls_are_discs:
             self._dispatch(self._vpls, self._count, inputs)
             return
         if self._samples is None:
             samples, context = sample_count(self._count), self._resources.context
-            self._resources["vpl_samples"] = context.buffer(reserve=samples * VPL_BYTES)
+            self._resources["first_samples"] = context.buffer(reserve=samples * VPL_BYTES)
             self._resources["sample_table"] = context.buffer(r2_sequence(samples).tobytes())
-            self._samples = self._program("sample_table", "vpl_samples")
+            self._samples = self._program("sample_table", "first_samples")
         self._dispatch(self._samples, sample_count(self._count), inputs)
 
     def _program(self, table: str, target: str) -> ComputeProgram:

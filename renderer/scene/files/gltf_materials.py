@@ -1,13 +1,14 @@
-"""glTF materials: base-colour factors and textures. A diffuse material has no use for the rest."""
+"""glTF materials: base colours and emission. A diffuse material has no use for the rest."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float64, UInt8
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, label
 from vpltune.renderer.scene.files.gltf_accessors import GltfAccessors
 from vpltune.renderer.scene.files.gltf_document import GltfDocument
+from vpltune.renderer.scene.files.gltf_emission import GltfEmission
 from vpltune.renderer.scene.files.gltf_textures import (
     GltfTextures,
     Layers,
@@ -33,7 +34,7 @@ class BaseColor:
     material: int
     """Index into the scene's materials."""
     uv_set: int | None = None
-    """The set of texture coordinates, n of TEXCOORD_n; None without a texture."""
+    """The set of texture coordinates, n of TEXCOORD_n, for all textures; None without a texture."""
     uv_transform: Float64[np.ndarray, "2 3"] | None = None
     """The KHR_texture_transform, if any."""
 
@@ -44,9 +45,12 @@ class GltfMaterials:
     def __init__(self, document: GltfDocument, accessors: GltfAccessors, ktx2: LimitedDecoder) -> None:
         self._document = document
         self._textures = GltfTextures(document, accessors, ktx2)
+        self._emission = GltfEmission(document, self._textures)
         self.materials: list[Material] = []
         self._base_colors: dict[str, BaseColor] = {}
         self._left_out: set[str] = set()
+        self._unreadable: dict[str, str] = {}
+        """Why metallic images cannot be read, by their places."""
 
     @property
     def textures(self) -> list[Texture]:
@@ -105,10 +109,19 @@ class GltfMaterials:
         read = self._transmitting(read, material, color, 1.0 - metallic)
         read = without_idle_alpha(read, None if texture is None else self.textures[texture])
         say_blended(read, self._document.warnings)
+        placed = None if texture is None else layers.placed
+        glow = self._emission.of(material, placed)
+        read = replace(
+            read,
+            emission=glow.radiance,
+            emission_texture=glow.texture,
+            emits_both_ways=glow.both_ways,
+        )
         self.materials.append(read)
-        if layers.placed is None or texture is None:
+        placed = placed or glow.placed
+        if placed is None:
             return BaseColor(len(self.materials) - 1)
-        return BaseColor(len(self.materials) - 1, uv_set(layers.placed), uv_transform(layers.placed))
+        return BaseColor(len(self.materials) - 1, uv_set(placed), uv_transform(placed))
 
     def _transmitting(
         self, read: Material, material: JsonObject, color: JsonObject | None, matt: float
@@ -153,13 +166,6 @@ class GltfMaterials:
 
     def _warn_of_ignored(self, material: JsonObject) -> None:
         warnings = self._document.warnings
-        emissive = material.numbers("emissiveFactor", 3, default=(0.0, 0.0, 0.0))
-        strength = material.extension("KHR_materials_emissive_strength")
-        if (emissive > 0.0).any() and (strength is None or strength.number("emissiveStrength", 1.0) > 0.0):
-            warnings.tally(
-                "1 material emits light; emission does not light the scene yet",
-                "{n} materials emit light; emission does not light the scene yet",
-            )
         if material.extension("KHR_materials_diffuse_transmission") is not None:
             warnings.tally(
                 "1 material transmits light diffusely; it is drawn opaque",
@@ -183,8 +189,10 @@ class GltfMaterials:
         factor = holder.number("metallicFactor", 1.0, low=0.0, high=1.0)
         info = holder.object("metallicRoughnessTexture")
         image = None if info is None or factor == 0.0 else self._textures.image(info)
-        if info is not None and image is not None:
-            metalness = self._textures.texels(image)[..., 2]
+        metalness = None if image is None else self._metal_texels(image)
+        if metalness is None:
+            image = None
+        elif info is not None:
             if metalness.min() == metalness.max():
                 factor, info = factor * int(metalness.min()) / 255.0, None
             elif color is not None and not placed_alike(info, color):
@@ -199,3 +207,21 @@ class GltfMaterials:
                 "{n} materials are metallic; their diffuse parts are drawn, their reflections are not",
             )
         return factor, info if image is not None else None
+
+    def _metal_texels(self, image: JsonObject) -> UInt8[np.ndarray, "height width"] | None:
+        """The metalness of an image; None, with a warning, where it is missing or broken.
+
+        Only a base colour's image is worth a refusal: without this one, the surfaces are still those of the
+        file, and their factor says how metallic they are.
+        """
+        if image.where not in self._unreadable:
+            try:
+                return self._textures.texels(image)[..., 2]
+            except SceneFileError as error:
+                self._unreadable[image.where] = str(error)
+        first = next(iter(self._unreadable.values()))
+        self._document.warnings.tally(
+            f"1 metallic texture counts as white: {first}",
+            f"{{n}} metallic textures count as white; for one, {first}",
+        )
+        return None

@@ -19,6 +19,7 @@ from vpltune.renderer.scene.files.gltf_primitives import GltfPrimitives
 from vpltune.renderer.scene.files.json_object import JsonObject, JsonObjects
 from vpltune.renderer.scene.files.limited_decoder import LimitedDecoder
 from vpltune.renderer.scene.files.limits import MAX_CAMERAS, MAX_INSTANCES, MAX_LIGHTS
+from vpltune.renderer.scene.files.surface import turned
 from vpltune.renderer.scene.scene import Camera, Instance, Light, Mesh, Scene
 from vpltune.renderer.scene.transforms import trs_matrices
 
@@ -73,6 +74,7 @@ class _SceneBuilder:
         self._surfaces: dict[str, list[JsonObject]] = {}
         self._skins: dict[RestSkin, int] = {}
         self._meshes_at_rest: dict[tuple[str, Deformation], int | None] = {}
+        self._turned: dict[int, int] = {}
         self._counts: Counter[str] = Counter()
 
     def look_for_lit_surfaces(self, shown: list[int]) -> None:
@@ -133,12 +135,27 @@ class _SceneBuilder:
         for primitive in primitives:
             at = self._mesh_at_rest(primitive, mesh, deformation)
             if at is not None:
-                self.instances += [Instance(name, at, matrix) for matrix in to_world]
+                self.instances += [Instance(name, self._fronted(at, matrix), matrix) for matrix in to_world]
                 self.placed.instance_nodes += [-1 if is_placed_by_joints else index] * len(to_world)
                 self.placed.instance_local += list(local)
                 is_bent = self.meshes[at].skinning is not None
                 skin = self._placed_skin(deformation.skin) if is_bent and deformation.skin else -1
                 self.placed.instance_skins += [skin] * len(to_world)
+
+    def _fronted(self, at: int, to_world: Float64[np.ndarray, "4 4"]) -> int:
+        """The index of the mesh, or of one wound the other way where that is the front that shines.
+
+        The front of a mirrored node winds clockwise (glTF 2.0, section 3.7.4), that of ours never does.
+        """
+        mesh = self.meshes[at]
+        material = self.materials.materials[mesh.material]
+        if not material.glows or material.emits_both_ways or np.linalg.det(to_world[:3, :3]) >= 0.0:
+            return at
+        if at not in self._turned:
+            self._turned[at] = len(self.meshes)
+            self.document.decoded.spend(mesh.triangles.nbytes + mesh.normals.nbytes, mesh.name)
+            self.meshes.append(turned(mesh))
+        return self._turned[at]
 
     def _surfaces_of(self, mesh: JsonObject) -> list[JsonObject]:
         if mesh.where not in self._surfaces:

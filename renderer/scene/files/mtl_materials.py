@@ -1,7 +1,7 @@
-"""Wavefront MTL: the diffuse colour and map of materials. A diffuse material has no use for the rest."""
+"""Wavefront MTL: diffuse colours, emission and maps. A diffuse material has no use for the rest."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -9,6 +9,7 @@ from jaxtyping import Float32, UInt8
 
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, label, one_line
 from vpltune.renderer.scene.files.image_texels import MTL_FORMATS, ImageDecoder
+from vpltune.renderer.scene.files.limits import LARGEST_RADIOMETRIC
 from vpltune.renderer.scene.files.opacity import say_blended, without_idle_alpha
 from vpltune.renderer.scene.files.plain_numbers import plain_number
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
@@ -19,7 +20,7 @@ from vpltune.renderer.scene.scene import Material, Texture, Wrap
 _Image = TypeVar("_Image")
 
 # Statements that end in a name.
-_NAMING = (b"newmtl", b"map_kd", b"map_d")
+_NAMING = (b"newmtl", b"map_kd", b"map_ke", b"map_d")
 # Options of map_Kd and how many words follow each. The options in `_TRANSFORMS` take one to three numbers.
 _MAP_OPTIONS = {
     "-blendu": 1,
@@ -50,6 +51,10 @@ class _Definition:
     metallic: float = 0.0
     """As `Pm` says it, in [0, 1]."""
     opacity_path: str = ""
+    emission: tuple[float, float, float] | None = None
+    """As `Ke` says it, in W/(m² sr). None where it does not."""
+    emission_path: str = ""
+    emission_wrap: Wrap = "repeat"
 
 
 @dataclass(frozen=True)
@@ -112,7 +117,9 @@ class MtlMaterials:
         self._decoder = ImageDecoder(MTL_FORMATS)
         self._definitions: dict[str, _Definition] = {}
         self._texture_indices: dict[tuple[str, str, Wrap], int | None] = {}
+        self._emission_textures: dict[tuple[str, Wrap], int | None] = {}
         self._missing_maps: list[str] = []
+        self._dark_maps = 0
         self._libraries: dict[str, bool] = {}
         self.materials: list[Material] = []
         self.textures: list[Texture] = []
@@ -161,8 +168,50 @@ class MtlMaterials:
         material = Material(label(name, "default"), diffuse, texture, "blend", opacity)
         material = without_idle_alpha(material, None if texture is None else self.textures[texture])
         say_blended(material, self._warnings)
+        material = self._glowing(material, definition)
         self.materials.append(material)
         return len(self.materials) - 1
+
+    def _glowing(self, material: Material, definition: _Definition) -> Material:
+        """The material with its emission. MTL knows no front, so it emits both ways."""
+        # A map without Ke: the programs that write one mean it to shine.
+        emission = definition.emission or ((1.0, 1.0, 1.0) if definition.emission_path else (0.0, 0.0, 0.0))
+        if not any(emission):
+            if definition.emission_path:
+                self._warnings.tally(
+                    "1 material is dark: its Ke 0 0 0 multiplies its map_Ke",
+                    "{n} materials are dark: their Ke 0 0 0 multiplies their map_Ke",
+                )
+            return material
+        return replace(
+            material,
+            emission=emission,
+            emission_texture=self._emission_texture(definition),
+            emits_both_ways=True,
+        )
+
+    def _emission_texture(self, definition: _Definition) -> int | None:
+        if not definition.emission_path:
+            return None
+        key = (definition.emission_path, definition.emission_wrap)
+        if key not in self._emission_textures:
+            self._emission_textures[key] = self._read_emission_texture(definition)
+        return self._emission_textures[key]
+
+    def _read_emission_texture(self, definition: _Definition) -> int | None:
+        path, wrap = definition.emission_path.replace("\\", "/"), definition.emission_wrap
+        try:
+            texels = self._decoder.decode(self._folder.read(path, "map_Ke"), f"map_Ke {path!r:.80}")
+        except SceneFileError as error:
+            # Only the first has its cause told.
+            if not self._dark_maps:
+                self._warnings.add(f"{error}; Ke alone is used")
+            else:
+                self._warnings.tally("1 more map_Ke cannot be read", "{n} more map_Ke cannot be read")
+            self._dark_maps += 1
+            return None
+        self.textures.append(Texture(label(path, "map_Ke"), texels, wrap, wrap))
+        return len(self.textures) - 1
 
     def say_what_is_missing(self) -> None:
         """Add one warning for all maps that could not be read."""
@@ -249,11 +298,14 @@ class MtlMaterials:
             definition.wrap = "clamp_to_edge" if said.clamps else "repeat"
             for option in said.ignored:
                 self._warnings.add(f"map_Kd option {option} is ignored")
-        elif keyword == "Ke" and self._color(rest, where).any():
-            self._warnings.tally(
-                "1 material emits light; emission does not light the scene yet",
-                "{n} materials emit light; emission does not light the scene yet",
-            )
+        elif keyword == "Ke":
+            definition.emission = _radiance(self._color(rest, where), where)
+        elif keyword.lower() == "map_ke":
+            said = map_statement(rest)
+            definition.emission_path = said.path
+            definition.emission_wrap = "clamp_to_edge" if said.clamps else "repeat"
+            for option in said.ignored:
+                self._warnings.add(f"map_Ke option {option} is ignored")
         elif keyword == "d":
             definition.opacity = _leading_number(rest.removeprefix("-halo"), 1.0)
         elif keyword == "Tr" and definition.opacity is None:
@@ -288,6 +340,15 @@ class MtlMaterials:
                 "{n} material colours lie outside [0, 1]; they are clamped",
             )
         return np.clip(color, 0.0, 1.0)
+
+
+def _radiance(color: Float32[np.ndarray, "3"], where: str) -> tuple[float, float, float]:
+    if not ((color >= 0.0).all() and (color <= LARGEST_RADIOMETRIC).all()):
+        raise SceneFileError(
+            f"{where}: Ke must be from 0 to {LARGEST_RADIOMETRIC:g}, got {', '.join(f'{c:g}' for c in color)}"
+        )
+    red, green, blue = color.tolist()
+    return red, green, blue
 
 
 def _leading_number(text: str, absent: float) -> float:

@@ -5,12 +5,11 @@ file instead of from the current line, and silently drops normals, textures and 
 """
 
 from array import array
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int64
+from jaxtyping import Float32, Float64, Int32, Int64
 
 from vpltune.renderer.files.srgb import linear_from_srgb
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, label
@@ -19,7 +18,8 @@ from vpltune.renderer.scene.files.mtl_materials import MtlMaterials
 from vpltune.renderer.scene.files.plain_numbers import finite_numbers, plain_index
 from vpltune.renderer.scene.files.polygon_triangulation import triangulated
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
-from vpltune.renderer.scene.files.surface import Surface, finished_mesh, used_vertices
+from vpltune.renderer.scene.files.surface import Surface
+from vpltune.renderer.scene.files.surface_parts import Part, batches, finished_meshes
 from vpltune.renderer.scene.files.text_lines import first_word, text_lines, without_remark
 from vpltune.renderer.scene.scene import Instance, Mesh, Scene
 
@@ -188,51 +188,74 @@ def _meshes(
         return []
     vertices, colors = _vertices(text, warnings)
     pools = (vertices, _rows(text.uvs, 2), _rows(text.normals, 3))
-    keys, key_of_corner = _distinct(text.corners, pools)
-    meshes = []
-    for material, sizes, corners in _faces_by_material(text, key_of_corner):
-        cut = triangulated(sizes, vertices[keys[corners, 0]], f"material {material!r:.60}")
-        used, renumbered = used_vertices(corners[cut.ravel()], len(keys))
-        surface = _surface(keys[used], renumbered.reshape(-1, 3), pools, colors)
+    keys, material_of_key, key_of_corner = _distinct(text, pools)
+    material_of_face, sizes, corners = _by_material(text, key_of_corner)
+    names = [f"material {name!r:.60}" for name in text.materials]
+    # If the largest face has too many corners, it is refused.
+    cut = triangulated(sizes, vertices[keys[corners, 0]], names[material_of_face[sizes.argmax()]])
+    triangles = corners[cut]
+    counts = [
+        np.bincount(material_of_key, minlength=len(names)),
+        np.bincount(np.repeat(material_of_face, sizes - 2), minlength=len(names)),
+        np.bincount(material_of_key[keys[:, 1] >= 0], minlength=len(names)),
+    ]
+    parts: list[Part] = []
+    for material, where, *own in zip(text.materials, names, *(each.tolist() for each in counts), strict=True):
+        vertex_count, triangle_count, uv_count = own
         index = materials.add(material)
-        if materials.materials[index].texture is not None and (keys[used, 1] < 0).any():
+        if materials.materials[index].texture is not None and uv_count < vertex_count:
             warnings.add("corners without vt are textured at (0, 0)")
-        mesh = finished_mesh(surface, label(material, name), index, decoded, f"material {material!r:.60}")
-        meshes += [] if mesh is None else [mesh]
+        parts.append(Part(label(material, name), index, where, vertex_count, triangle_count, uv_count > 0))
+    meshes: list[Mesh] = []
+    first_key = first_triangle = 0
+    for batch in batches([part.triangle_count for part in parts]):
+        end_key = first_key + sum(part.vertex_count for part in parts[batch])
+        end_triangle = first_triangle + sum(part.triangle_count for part in parts[batch])
+        surface = _surface(
+            keys[first_key:end_key], triangles[first_triangle:end_triangle] - first_key, pools, colors
+        )
+        meshes += finished_meshes(surface, parts[batch], decoded)
+        first_key, first_triangle = end_key, end_triangle
     return meshes
 
 
 def _distinct(
-    corners: array, pools: tuple[np.ndarray, np.ndarray, np.ndarray]
-) -> tuple[Int64[np.ndarray, "keys 3"], Int64[np.ndarray, " corners"]]:
-    """The distinct corners (vertex, uv, normal), and for each corner which of them it is."""
-    rows = np.frombuffer(corners, np.int32).reshape(-1, 3)
+    text: _ObjText, pools: tuple[np.ndarray, np.ndarray, np.ndarray]
+) -> tuple[Int64[np.ndarray, "keys 3"], Int32[np.ndarray, " keys"], Int64[np.ndarray, " corners"]]:
+    """The distinct corners (vertex, uv, normal) of each material.
+
+    Returns:
+        The distinct corners, by material in the order of first use; the material of each; and for each corner
+        in the file, which of them it is.
+    """
+    rows = np.frombuffer(text.corners, np.int32).reshape(-1, 3)
     for column, (pool, keyword) in enumerate(zip(pools, ("v", "vt", "vn"), strict=True)):
         if rows[:, column].max() >= len(pool):
             raise SceneFileError(
                 f"faces: {keyword} index must be at most {len(pool)}, got {rows[:, column].max() + 1}"
             )
-    # One number for the pair first: the product of all three counts may exceed 64 bits.
+    # One number for the pair first: the product of all counts may exceed 64 bits.
     pairs = (rows[:, 1] + np.int64(1)) * (len(pools[2]) + 1) + (rows[:, 2] + 1)
     found, pair_of_corner = np.unique(pairs, return_inverse=True)
-    numbers = rows[:, 0] * np.int64(len(found)) + pair_of_corner.reshape(-1)
+    # Below 2⁶⁰: MAX_INSTANCES materials are fewer than 2¹⁴, and MAX_DECODED_BYTES has room for fewer than 2²³
+    # vertices and as many pairs.
+    material = np.repeat(np.frombuffer(text.face_materials, np.int32), text.sizes)
+    numbers = (material * np.int64(len(pools[0])) + rows[:, 0]) * len(found) + pair_of_corner.reshape(-1)
     _, first, key_of_corner = np.unique(numbers, return_index=True, return_inverse=True)
-    return rows[first].astype(np.int64), key_of_corner.reshape(-1).astype(np.int64)
+    return rows[first].astype(np.int64), material[first], key_of_corner.reshape(-1).astype(np.int64)
 
 
-def _faces_by_material(
+def _by_material(
     text: _ObjText, key_of_corner: Int64[np.ndarray, " corners"]
-) -> Iterator[tuple[str, Int64[np.ndarray, " faces"], Int64[np.ndarray, " corners"]]]:
-    """The faces of each material: its name, their corner counts, and their corners as distinct ones."""
+) -> tuple[Int32[np.ndarray, " faces"], Int64[np.ndarray, " faces"], Int64[np.ndarray, " corners"]]:
+    """Material and corner count of each face, and their corners as distinct ones; by material."""
     sizes = np.frombuffer(text.sizes, np.int32).astype(np.int64)
-    starts = np.cumsum(sizes) - sizes
     material_of_face = np.frombuffer(text.face_materials, np.int32)
+    starts = np.cumsum(sizes) - sizes
     order = np.argsort(material_of_face, kind="stable")
-    ends = np.cumsum(np.bincount(material_of_face))
-    for material, faces in zip(text.materials, np.split(order, ends[:-1]), strict=True):
-        own = sizes[faces]
-        within = np.arange(own.sum()) - np.repeat(np.cumsum(own) - own, own)
-        yield material, own, key_of_corner[np.repeat(starts[faces], own) + within]
+    own = sizes[order]
+    within = np.arange(own.sum()) - np.repeat(np.cumsum(own) - own, own)
+    return material_of_face[order], own, key_of_corner[np.repeat(starts[order], own) + within]
 
 
 def _surface(

@@ -52,24 +52,24 @@ def finished_mesh(
     require_within(surface.positions, "positions", LARGEST_COORDINATE, where)
     require_within(surface.normals, "normals", LARGEST_NORMAL, where)
     require_within(surface.uv, "uv", LARGEST_UV, where)
-    face_normals, has_area = _face_normals(surface.positions, surface.triangles)
+    flat_normals, has_area = face_normals(surface.positions, surface.triangles)
     if not has_area.any():
         return None
     if not has_area.all():
         surface = replace(surface, triangles=surface.triangles[has_area])
-        face_normals = face_normals[has_area]
-    per_vertex = 24 + 8 * (surface.uv is not None) + 12 * (surface.colors is not None)
+        flat_normals = flat_normals[has_area]
+    per_vertex = bytes_per_vertex(surface.uv is not None, surface.colors is not None)
     decoded.spend(12 * len(surface.triangles), where)
     if surface.normals is None:
         decoded.spend(per_vertex * surface.triangles.size, where)
-        surface, normals = _flat(surface, face_normals)
+        surface, normals = _flat(surface, flat_normals)
     else:
         surface = _without_unused_vertices(surface)
         assert surface.normals is not None
         unit, has_normal = unit_rows(surface.normals.astype(np.float64))
         lacking = ~has_normal[surface.triangles]
         decoded.spend(per_vertex * (len(unit) + int(lacking.sum())), where)
-        surface, normals = _smooth(surface, unit, lacking, face_normals)
+        surface, normals = _smooth(surface, unit, lacking, flat_normals)
     vertices = len(surface.positions)
     # Absent attributes are one broadcast row: most scenes have no vertex colours.
     uv = np.broadcast_to(np.zeros(2, np.float32), (vertices, 2)) if surface.uv is None else surface.uv
@@ -80,6 +80,16 @@ def finished_mesh(
     if surface.skinning is not None:
         decoded.spend(sum(array.nbytes for array in vars(surface.skinning).values()), where)
     return Mesh(name, surface.positions, normals, uv, colors, triangles, material, surface.skinning)
+
+
+def turned(mesh: Mesh) -> Mesh:
+    """The mesh wound the other way: what was its back is its front. The normals point there too."""
+    return replace(mesh, triangles=np.ascontiguousarray(mesh.triangles[:, ::-1]), normals=-mesh.normals)
+
+
+def bytes_per_vertex(has_uv: bool, has_colors: bool) -> int:
+    """What a vertex of a mesh takes: position, normal, and what else it has of its own."""
+    return 24 + 8 * has_uv + 12 * has_colors
 
 
 def require_within(values: np.ndarray | None, what: str, largest: float, where: str) -> None:
@@ -108,7 +118,7 @@ def used_vertices(
     return np.flatnonzero(is_used), (np.cumsum(is_used) - 1)[corners]
 
 
-def _face_normals(
+def face_normals(
     positions: Float32[np.ndarray, "vertices 3"], triangles: Int64[np.ndarray, "triangles 3"]
 ) -> tuple[Float32[np.ndarray, "triangles 3"], Bool[np.ndarray, " triangles"]]:
     """Unit normals from the winding, and which triangles have area. Normals of the others are zero."""
@@ -128,18 +138,18 @@ def _face_normals(
 
 
 def _flat(
-    surface: Surface, face_normals: Float32[np.ndarray, "triangles 3"]
+    surface: Surface, flat_normals: Float32[np.ndarray, "triangles 3"]
 ) -> tuple[Surface, Float32[np.ndarray, "corners 3"]]:
-    unshared = _gathered(surface, surface.triangles.ravel())
+    unshared = gathered(surface, surface.triangles.ravel())
     corners = np.arange(surface.triangles.size, dtype=np.int64).reshape(-1, 3)
-    return replace(unshared, triangles=corners), np.repeat(face_normals, 3, axis=0)
+    return replace(unshared, triangles=corners), np.repeat(flat_normals, 3, axis=0)
 
 
 def _smooth(
     surface: Surface,
     normals: Float32[np.ndarray, "vertices 3"],
     lacking: Bool[np.ndarray, "triangles 3"],
-    face_normals: Float32[np.ndarray, "triangles 3"],
+    flat_normals: Float32[np.ndarray, "triangles 3"],
 ) -> tuple[Surface, Float32[np.ndarray, "vertices_and_corners 3"]]:
     if not lacking.any():
         return surface, normals
@@ -148,10 +158,10 @@ def _smooth(
     sources = np.concatenate([np.arange(len(normals)), surface.triangles[triangle, corner]])
     triangles = surface.triangles.copy()
     triangles[triangle, corner] = len(normals) + np.arange(len(triangle))
-    normals = np.concatenate([normals, face_normals[triangle]])
-    extended = replace(_gathered(surface, sources), triangles=triangles)
+    normals = np.concatenate([normals, flat_normals[triangle]])
+    extended = replace(gathered(surface, sources), triangles=triangles)
     used, corners = used_vertices(triangles.ravel(), len(sources))
-    return replace(_gathered(extended, used), triangles=corners.reshape(-1, 3)), normals[used]
+    return replace(gathered(extended, used), triangles=corners.reshape(-1, 3)), normals[used]
 
 
 def unit_rows(
@@ -167,10 +177,10 @@ def _without_unused_vertices(surface: Surface) -> Surface:
     used, corners = used_vertices(surface.triangles.ravel(), len(surface.positions))
     if len(used) == len(surface.positions):
         return surface
-    return replace(_gathered(surface, used), triangles=corners.reshape(-1, 3))
+    return replace(gathered(surface, used), triangles=corners.reshape(-1, 3))
 
 
-def _gathered(surface: Surface, rows: Int64[np.ndarray, " rows"]) -> Surface:
+def gathered(surface: Surface, rows: Int64[np.ndarray, " rows"]) -> Surface:
     """The surface whose vertex i is the old vertex rows[i]. The triangles are unchanged."""
     return Surface(
         surface.positions[rows],

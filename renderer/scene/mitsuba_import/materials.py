@@ -7,12 +7,19 @@ from jaxtyping import Float64, UInt8
 
 from vpltune.renderer.files.srgb import linear_from_srgb, srgb_from_linear
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings, label
+from vpltune.renderer.scene.files.exr_pixels import exr_channels
 from vpltune.renderer.scene.files.image_texels import MTL_FORMATS, ImageDecoder
 from vpltune.renderer.scene.files.opacity import say_blended, without_idle_alpha
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
 from vpltune.renderer.scene.files.texel_products import of_size
-from vpltune.renderer.scene.mitsuba_import.environment_map import exr_channels
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
+from vpltune.renderer.scene.mitsuba_import.texture_plugins import (
+    MEAN_ROWS,
+    check_bitmap,
+    linear_mean,
+    uv_transform,
+    within_scale,
+)
 from vpltune.renderer.scene.scene import Material, Texture, Wrap
 
 # Mitsuba's wrap modes.
@@ -36,8 +43,6 @@ _GLASS = ("dielectric", "thindielectric", "roughdielectric", "null")
 _CHECKER_TEXELS = 64
 # Mitsuba's defaults for its fields.
 _COLOR0, _COLOR1 = (0.4, 0.4, 0.4), (0.2, 0.2, 0.2)
-# A choice: rows of an image averaged at a time, which are a few MiB.
-_MEAN_ROWS = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +53,18 @@ class Surfacing:
     """Index into the scene's materials."""
     to_uv: Float64[np.ndarray, "3 3"]
     """Affine transform of homogeneous (u, v, 1)."""
+
+
+@dataclass(frozen=True, eq=False)
+class AreaEmission:
+    """What the material of an emitting shape emits."""
+
+    radiance: tuple[float, float, float]
+    """RGB in W/(m² sr); a factor of the texture, if there is one."""
+    texture: int | None
+    """Index into the scene's textures."""
+    to_uv: Float64[np.ndarray, "3 3"]
+    """Affine transform of texture coordinates (u, v, 1) that the texture asks for."""
 
 
 class MaterialReader:
@@ -62,6 +79,11 @@ class MaterialReader:
         self._decoded: dict[tuple[str, bool], UInt8[np.ndarray, "height width 3"]] = {}
         self._means: dict[tuple[str, bool], np.ndarray] = {}
         self._textured_with: dict[tuple[int, Wrap], int] = {}
+        self._bright: dict[tuple[str, Wrap], tuple[np.ndarray, int]] = {}
+        self._glowing: dict[tuple[object, ...], Surfacing] = {}
+        # Mitsuba's default for a shape that emits.
+        self._black = Plugin("bsdf", "diffuse", "a shape without a material")
+        self._black.values["reflectance"] = 0.0
         self._default = Plugin("bsdf", "diffuse", "a shape without a material")
         self._made: dict[int, Surfacing | None] = {}
         self._kept: list[Plugin] = []
@@ -82,6 +104,38 @@ class MaterialReader:
             self._made[id(bsdf)] = self._diffuse_part(bsdf)
         return self._made[id(bsdf)]
 
+    def glowing(self, bsdf: Plugin | None, emission: AreaEmission) -> Surfacing:
+        """A material of its own for a shape that emits; black where the BSDF has no diffuse part.
+
+        A mesh has one set of texture coordinates. Where the texture of the radiance lies otherwise than that
+        of the BSDF, the latter goes.
+
+        Args:
+            bsdf: the plugin; None stands for Mitsuba's default of emitting shapes, which is black.
+            emission: of the shape.
+
+        Raises:
+            SceneFileError: as `surfacing`.
+        """
+        plain = self.surfacing(self._black if bsdf is None else bsdf)
+        plain = plain or self.surfacing(self._black)
+        assert plain is not None
+        key = (plain.material, emission.radiance, emission.texture, emission.to_uv.tobytes())
+        if key not in self._glowing:
+            material, to_uv = self.materials[plain.material], plain.to_uv
+            if emission.texture is not None:
+                if material.texture is not None and not np.allclose(to_uv, emission.to_uv):
+                    self._warnings.add(
+                        "an area emitter's texture lies otherwise than that of its material, which is dropped"
+                    )
+                    material = replace(material, texture=None)
+                to_uv = emission.to_uv
+            self.materials.append(
+                replace(material, emission=emission.radiance, emission_texture=emission.texture)
+            )
+            self._glowing[key] = Surfacing(len(self.materials) - 1, to_uv)
+        return self._glowing[key]
+
     def mean_color(self, texture: Plugin) -> Float64[np.ndarray, "3"]:
         """The mean of a texture's linear values over all texels.
 
@@ -89,10 +143,10 @@ class MaterialReader:
             SceneFileError: the texture type is unsupported, or its image cannot be read.
         """
         if texture.type == "scale":
-            return self.mean_color(_scaled(texture)) * texture.vector("scale", (1.0, 1.0, 1.0))
+            return self.mean_color(within_scale(texture)) * texture.vector("scale", (1.0, 1.0, 1.0))
         if texture.type == "checkerboard":
             return (texture.vector("color0", _COLOR0) + texture.vector("color1", _COLOR1)) / 2.0
-        _check_bitmap(texture)
+        check_bitmap(texture)
         name, is_raw = texture.text("filename"), texture.flag("raw", False)
         if (name, is_raw) not in self._means:
             if name.lower().endswith(".exr"):
@@ -100,9 +154,59 @@ class MaterialReader:
                 channels = exr_channels(content, f"{texture.where}: {name!r:.80}")
                 mean = np.array([channel.mean(dtype=np.float64) for channel in channels])
             else:
-                mean = _linear_mean(self._texels(texture))
+                mean = linear_mean(self._texels(texture))
             self._means[name, is_raw] = mean
         return self._means[name, is_raw]
+
+    def emission_texture(
+        self, texture: Plugin
+    ) -> tuple[Float64[np.ndarray, "3"], int, Float64[np.ndarray, "3 3"]] | None:
+        """A bitmap of radiance as a factor, the index of a texture, and the transform of its coordinates.
+
+        Returns:
+            None if the texture is no bitmap.
+
+        Raises:
+            SceneFileError: the texture type is unsupported, or its image cannot be read.
+        """
+        factor = np.ones(3)
+        while texture.type == "scale":
+            factor = factor * texture.vector("scale", (1.0, 1.0, 1.0))
+            texture = within_scale(texture)
+        if texture.type != "bitmap":
+            return None
+        if not texture.text("filename").lower().endswith(".exr"):
+            return factor, self._bitmap(texture), uv_transform(texture)
+        key = (texture.text("filename"), self._wrap(texture))
+        if key not in self._bright:
+            self._bright[key] = self._eight_bits(texture)
+        largest, index = self._bright[key]
+        return factor * largest, index, uv_transform(texture)
+
+    def _eight_bits(self, texture: Plugin) -> tuple[Float64[np.ndarray, "3"], int]:
+        """The largest value of each channel of an OpenEXR image, and the texture of the shares of it."""
+        name = texture.text("filename")
+        content = self._folder.read(name, texture.where)
+        channels = exr_channels(content, f"{texture.where}: {name!r:.80}")
+        height, width = channels[0].shape
+        self._images.admit((width, height), len(content), texture.where)
+        largest = np.array([float(channel.max()) for channel in channels])
+        texels = np.empty((height, width, 3), np.uint8)
+        is_lost = False
+        for index, channel in enumerate(channels):
+            for top in range(0, height, MEAN_ROWS):
+                rows = slice(top, top + MEAN_ROWS)
+                shares = channel[rows] / np.float32(largest[index] or 1.0)
+                texels[rows, :, index] = np.round(255.0 * srgb_from_linear(shares))
+                is_lost |= bool(((texels[rows, :, index] == 0) & (shares > 0.0)).any())
+        if is_lost:
+            self._warnings.add(
+                f"the radiance {name!r:.60} spans more than eight bits hold: what is below 0.00015 of its "
+                "largest value is dark"
+            )
+        wrap = self._wrap(texture)
+        self.textures.append(Texture(label(name, "texture"), texels, wrap, wrap))
+        return largest, len(self.textures) - 1
 
     def _diffuse_part(self, bsdf: Plugin) -> Surfacing | None:
         name = bsdf.type
@@ -156,7 +260,9 @@ class MaterialReader:
         opacity = mask.child("opacity")
         if opacity is None or opacity.kind != "texture":
             number = min(max(float(mask.vector("opacity", (0.5, 0.5, 0.5)).mean()), 0.0), 1.0)
-        elif opacity.type != "bitmap" or (texture is not None and not np.allclose(_to_uv(opacity), to_uv)):
+        elif opacity.type != "bitmap" or (
+            texture is not None and not np.allclose(uv_transform(opacity), to_uv)
+        ):
             self._warnings.add(
                 "mask: an opacity that is no bitmap, or placed otherwise than the colour, is ignored"
             )
@@ -164,7 +270,7 @@ class MaterialReader:
         else:
             # `_texels` holds plain numbers encoded too.
             linear = linear_from_srgb(self._texels(opacity)[..., 0] / 255.0)
-            plane, to_uv = np.round(255.0 * linear).astype(np.uint8), _to_uv(opacity)
+            plane, to_uv = np.round(255.0 * linear).astype(np.uint8), uv_transform(opacity)
             texture = _with_opacity(texture, plane, self._images, mask.where)
             index = len(self.textures)
             self.textures.append(texture)
@@ -200,11 +306,24 @@ class MaterialReader:
     def _textured(self, name: str, texture: Plugin, factor: Float64[np.ndarray, "3"]) -> Surfacing:
         if texture.type == "scale":
             factor = factor * texture.vector("scale", (1.0, 1.0, 1.0))
-            return self._textured(name, _scaled(texture), factor)
-        to_uv = _to_uv(texture)
+            return self._textured(name, within_scale(texture), factor)
+        to_uv = uv_transform(texture)
         if texture.type == "checkerboard":
             return self._add(name, factor, self._checkerboard(texture), to_uv)
-        _check_bitmap(texture)
+        check_bitmap(texture)
+        return self._add(name, factor, self._bitmap(texture), to_uv)
+
+    def _bitmap(self, texture: Plugin) -> int:
+        """The index of the texture of a bitmap with eight bits."""
+        wrap, texels = self._wrap(texture), self._texels(texture)
+        key = (id(texels), wrap)
+        if key not in self._textured_with:
+            self._textured_with[key] = len(self.textures)
+            of_file = label(texture.text("filename"), "texture")
+            self.textures.append(Texture(of_file, texels, wrap, wrap))
+        return self._textured_with[key]
+
+    def _wrap(self, texture: Plugin) -> Wrap:
         if texture.text("filter_type", "bilinear") == "nearest":
             self._warnings.add(
                 "textures are filtered bilinearly, although the scene asks for nearest filtering"
@@ -214,13 +333,7 @@ class MaterialReader:
             raise SceneFileError(
                 f"{texture.where}: wrap_mode must be one of {', '.join(_WRAPS)}, got {wrap!r:.40}"
             )
-        texels = self._texels(texture)
-        key = (id(texels), _WRAPS[wrap])
-        if key not in self._textured_with:
-            self._textured_with[key] = len(self.textures)
-            of_file = label(texture.text("filename"), "texture")
-            self.textures.append(Texture(of_file, texels, _WRAPS[wrap], _WRAPS[wrap]))
-        return self._add(name, factor, self._textured_with[key], to_uv)
+        return _WRAPS[wrap]
 
     def _texels(self, texture: Plugin) -> UInt8[np.ndarray, "height width 3"]:
         name, is_raw = texture.text("filename"), texture.flag("raw", False)
@@ -265,44 +378,3 @@ def _with_opacity(
     if texture is None:
         return Texture("mask", np.full((height, width, 3), 255, np.uint8), opacity=opacity)
     return replace(texture, texels_srgb=of_size(texture.texels_srgb, width, height), opacity=opacity)
-
-
-def texture_name(texture: Plugin) -> str:
-    """What a texture is called in messages: its file, or else its type."""
-    if texture.type == "scale":
-        return texture_name(_scaled(texture))
-    return repr(label(texture.text("filename", texture.type), "?"))
-
-
-def _scaled(texture: Plugin) -> Plugin:
-    """The texture within one of the type 'scale'."""
-    within = texture.of_kind("texture")
-    if not within:
-        raise SceneFileError(f"{texture.where}: must contain a texture")
-    return within[0]
-
-
-def _check_bitmap(texture: Plugin) -> None:
-    if texture.type != "bitmap":
-        raise SceneFileError(f"{texture.where}: unsupported texture type; must be bitmap or checkerboard")
-
-
-def _linear_mean(texels_srgb: UInt8[np.ndarray, "height width 3"]) -> Float64[np.ndarray, "3"]:
-    linear = linear_from_srgb(np.arange(256) / 255.0)
-    height, width, _ = texels_srgb.shape
-    total = np.zeros(3)
-    for top in range(0, height, _MEAN_ROWS):
-        strip = texels_srgb[top : top + _MEAN_ROWS].reshape(-1, 3)
-        total += [np.bincount(channel, minlength=256) @ linear for channel in strip.T]
-    return total / (height * width)
-
-
-def _to_uv(texture: Plugin) -> Float64[np.ndarray, "3 3"]:
-    """The affine transform of texture coordinates: a `to_uv`, or the scales and offsets of version 0.x."""
-    if "to_uv" in texture.values:
-        matrix = texture.to_world("to_uv")
-        return matrix[np.ix_((0, 1, 3), (0, 1, 3))]
-    scale = texture.number("uvscale", 1.0)
-    result = np.diag([texture.number("uscale", scale), texture.number("vscale", scale), 1.0])
-    result[:2, 2] = texture.number("uoffset", 0.0), texture.number("voffset", 0.0)
-    return result

@@ -7,23 +7,18 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float64
 
+from vpltune.renderer.scene.environment import Environment
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
-from vpltune.renderer.scene.files.limits import LARGEST_UV, MAX_INSTANCES, DecodedBytes
+from vpltune.renderer.scene.files.limits import LARGEST_UV, MAX_INSTANCES, MAX_LIGHTS, DecodedBytes
 from vpltune.renderer.scene.files.plain_numbers import plain_number
 from vpltune.renderer.scene.files.reading_border import read_at_border, require_few_placed
-from vpltune.renderer.scene.files.surface import require_within
-from vpltune.renderer.scene.mitsuba_import.emitters import (
-    Facets,
-    area_emitter,
-    area_radiance,
-    mesh_facets,
-    punctual_light,
-    strongest,
-)
+from vpltune.renderer.scene.files.surface import require_within, turned
+from vpltune.renderer.scene.mitsuba_import.emitters import area_emission, punctual_light
+from vpltune.renderer.scene.mitsuba_import.environment_map import ENVIRONMENTS, SKY_MODELS, environment_of
 from vpltune.renderer.scene.mitsuba_import.materials import MaterialReader, Surfacing
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin, plugin_tree
 from vpltune.renderer.scene.mitsuba_import.searched_folder import SearchedFolder
-from vpltune.renderer.scene.mitsuba_import.shapes import ShapeReader
+from vpltune.renderer.scene.mitsuba_import.shapes import Shape, ShapeReader, wound_by_normals
 from vpltune.renderer.scene.mitsuba_import.xml_tree import parse_xml
 from vpltune.renderer.scene.scene import Camera, Instance, Light, Mesh, Scene
 from vpltune.renderer.scene.transforms import without_scale
@@ -52,9 +47,9 @@ class _Import:
     decoded: DecodedBytes = field(default_factory=DecodedBytes)
     meshes: list[Mesh] = field(default_factory=list)
     instances: list[Instance] = field(default_factory=list)
-    lights: list[tuple[Light, float]] = field(default_factory=list)
+    lights: list[Light] = field(default_factory=list)
     surfaced: dict[int, dict[int, int]] = field(default_factory=dict)
-    facets: dict[int, Facets] = field(default_factory=dict)
+    fronted: dict[tuple[int, bool], Mesh] = field(default_factory=dict)
     groups: dict[int, list[tuple[int, Float64[np.ndarray, "4 4"]]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -87,22 +82,39 @@ class _Import:
             textures=tuple(self.materials.textures),
         )
         require_few_placed(scene)
-        low, high = scene.bounds()
-        extent = float(np.linalg.norm(high - low))
-        for emitter in root.of_kind("emitter"):
-            found = punctual_light(emitter, self.folder, extent, self.warnings)
-            if found is not None:
-                self.lights.append(found)
+        environment = self._lights(root)
         self._warn_unread(root)
         cameras = tuple(camera for sensor in root.of_kind("sensor") if (camera := self._camera(sensor)))
-        if not self.lights:
+        if not (self.lights or environment or any(material.glows for material in scene.materials)):
             self.warnings.add("no light could be imported: add one, or let `vpltune fit` place one")
         return replace(
             scene,
-            lights=strongest(self.lights, self.warnings),
+            lights=tuple(self.lights),
             cameras=cameras,
+            environment=environment,
             warnings=self.warnings.lines(),
         )
+
+    def _lights(self, root: Plugin) -> Environment | None:
+        """Add the punctual lights; returns the environment, if there is one."""
+        environment = None
+        for emitter in root.of_kind("emitter"):
+            if emitter.type in SKY_MODELS:
+                self.warnings.add(
+                    f"emitter '{emitter.type}' is ignored: skies are read from images, not computed"
+                )
+            elif emitter.type in ENVIRONMENTS:
+                if environment is not None:
+                    self.warnings.add(f"{emitter.where} is ignored: a scene has one environment")
+                    continue
+                environment = environment_of(emitter, self.folder, self.warnings)
+            else:
+                light = punctual_light(emitter, self.warnings)
+                if light is not None:
+                    self.lights.append(light)
+        if len(self.lights) > MAX_LIGHTS:
+            raise SceneFileError(f"a scene must have at most {MAX_LIGHTS:,} lights, got {len(self.lights):,}")
+        return environment
 
     def _mesh(self, plugin: Plugin) -> tuple[int, Float64[np.ndarray, "4 4"]] | None:
         """Index of the shape's mesh and its transform to world; None if no surface is left."""
@@ -114,11 +126,28 @@ class _Import:
             )
             return None
         to_world = plugin.to_world() @ shape.to_shape
-        hidden = self._add_area_light(plugin, shape.mesh, to_world)
-        surfacing = self.materials.surfacing(next(iter(plugin.of_kind("bsdf")), None))
-        if surfacing is None or hidden:
-            return None
-        return self._surfaced(plugin, shape.mesh, surfacing), to_world
+        bsdf = next(iter(plugin.of_kind("bsdf")), None)
+        emitters = plugin.of_kind("emitter")
+        emission = area_emission(emitters[0], self.materials, self.warnings) if emitters else None
+        if emission is not None:
+            glowing = self.materials.glowing(bsdf, emission)
+            return self._surfaced(plugin, self._fronted(plugin, shape, to_world), glowing), to_world
+        surfacing = self.materials.surfacing(bsdf)
+        return None if surfacing is None else (self._surfaced(plugin, shape.mesh, surfacing), to_world)
+
+    def _fronted(self, plugin: Plugin, shape: Shape, to_world: Float64[np.ndarray, "4 4"]) -> Mesh:
+        """The mesh, wound counter-clockwise in the world on the side on which Mitsuba's normals point."""
+        by_normals = shape.front == "normals"
+        is_mirrored = by_normals and bool(np.linalg.det(to_world[:3, :3]) < 0.0)
+        turns = is_mirrored != plugin.flag("flip_normals", False)
+        key = (id(shape.mesh), turns)
+        if key not in self.fronted:
+            mesh = wound_by_normals(shape.mesh) if by_normals else shape.mesh
+            mesh = turned(mesh) if turns else mesh
+            if mesh is not shape.mesh:
+                self.decoded.spend(mesh.triangles.nbytes + mesh.normals.nbytes, plugin.where)
+            self.fronted[key] = mesh
+        return self.fronted[key]
 
     def _surfaced(self, plugin: Plugin, mesh: Mesh, surfacing: Surfacing) -> int:
         """Index of the mesh with a material. Shapes that have both in common share it."""
@@ -132,39 +161,6 @@ class _Import:
             of_mesh[surfacing.material] = len(self.meshes)
             self.meshes.append(replace(mesh, material=surfacing.material, uv=uv))
         return of_mesh[surfacing.material]
-
-    def _add_area_light(self, plugin: Plugin, mesh: Mesh, to_world: Float64[np.ndarray, "4 4"]) -> bool:
-        """Add the light of an emitting shape. True if its surface encloses the light and must be removed."""
-        emitters = plugin.of_kind("emitter")
-        if not emitters:
-            return False
-        outwards = -1.0 if plugin.flag("flip_normals", False) else 1.0
-        if plugin.type not in ("obj", "ply", "cube") and np.linalg.det(to_world[:3, :3]) < 0.0:
-            # Mitsuba transforms normals of analytic shapes; those of meshes follow the mirrored winding.
-            outwards = -outwards
-        if id(mesh) not in self.facets:
-            self.facets[id(mesh)] = mesh_facets(mesh)
-        radiance = area_radiance(emitters[0], self.materials, self.warnings)
-        found = area_emitter(radiance, self.facets[id(mesh)], to_world, outwards)
-        if found is None:
-            return False
-        kind = found.light.kind
-        if kind == "spot":
-            self.warnings.tally(
-                "1 area emitter becomes a spot of the same flux at its centre, along its normal, with a cos² "
-                "falloff: 1.5 times as bright straight ahead, and darker to the sides",
-                "{n} area emitters become spots of the same flux at their centres, along their normals, with "
-                "a cos² falloff: 1.5 times as bright straight ahead, and darker to the sides",
-            )
-        else:
-            self.warnings.tally(
-                "1 area emitter that faces all directions becomes a point light of the same flux at its "
-                "centre; its surface is removed",
-                "{n} area emitters that face all directions become point lights of the same flux at their "
-                "centres; their surfaces are removed",
-            )
-        self.lights.append((found.light, found.flux))
-        return found.hides_itself
 
     def _place_group(self, plugin: Plugin) -> None:
         for group in plugin.of_kind("shape"):

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float32, Float64, Int64
@@ -20,6 +21,11 @@ from vpltune.renderer.scene.scene import Mesh
 _SIDES = 80
 
 
+Front = Literal["winding", "normals"]
+"""The side on which the triangles wind counter-clockwise in the world, or that of the mesh's normals, which
+a mirror turns with the surface: then the front of a mirrored surface winds clockwise."""
+
+
 @dataclass(frozen=True, eq=False)
 class Shape:
     """Triangles, and the transform from the shape's parameters that is applied before `to_world`."""
@@ -28,6 +34,8 @@ class Shape:
     """The same object for all shapes that differ in their transform and material alone. Its material is 0."""
     to_shape: Float64[np.ndarray, "4 4"]
     """Such as the centre and radius of a sphere; the identity if there are none."""
+    front: Front
+    """What says on which side of the shape Mitsuba's normals point, and so its light leaves."""
 
 
 class ShapeReader:
@@ -44,6 +52,7 @@ class ShapeReader:
         self._warnings = warnings
         self._decoded = decoded
         self._made: dict[tuple[object, ...], Mesh | None] = {}
+        self._fronts: dict[tuple[object, ...], Front] = {}
 
     def read(self, shape: Plugin) -> Shape | None:
         """The triangles of a shape; None if no triangle has area.
@@ -60,7 +69,7 @@ class ShapeReader:
             flipped = shape.flag("flip_tex_coords", shape.type == "obj") != (shape.type == "obj")
             key: tuple[object, ...] = (shape.type, path, flipped, flat)
             if key not in self._made:
-                surface = self._from_file(shape, path, flipped, flat)
+                surface, self._fronts[key] = self._from_file(shape, path, flipped, flat)
                 self._made[key] = self._finished(surface, path.stem, shape)
             to_shape = np.eye(4)
         else:
@@ -71,10 +80,12 @@ class ShapeReader:
             if key not in self._made:
                 surface = _UNIT_SURFACES[shape.type]()
                 surface = replace(surface, normals=None) if flat else surface
+                # Of all shapes, Mitsuba's sphere alone turns its normals inwards in a mirror.
+                self._fronts[key] = "winding" if shape.type == "sphere" else "normals"
                 self._made[key] = self._finished(surface, shape.type, shape)
             to_shape = _TO_SHAPE.get(shape.type, _as_it_is)(shape)
         mesh = self._made[key]
-        return None if mesh is None else Shape(mesh, to_shape)
+        return None if mesh is None else Shape(mesh, to_shape, self._fronts.get(key, "normals"))
 
     def _finished(self, surface: Surface | None, name: str, shape: Plugin) -> Mesh | None:
         return None if surface is None else finished_mesh(surface, name, 0, self._decoded, shape.where)
@@ -85,7 +96,9 @@ class ShapeReader:
             raise SceneFileError(f"{shape.where}: {name!r:.80} does not exist")
         return self._folder.found(name, shape.where)
 
-    def _from_file(self, shape: Plugin, path: Path, flipped: bool, flat: bool) -> Surface | None:
+    def _from_file(
+        self, shape: Plugin, path: Path, flipped: bool, flat: bool
+    ) -> tuple[Surface | None, Front]:
         name = shape.text("filename")
         reader = read_obj if shape.type == "obj" else read_ply
         said = Warnings()
@@ -98,7 +111,7 @@ class ShapeReader:
             if "material" not in line and "mtl" not in line and "texture" not in line:
                 self._warnings.add(f"{name!r:.80}: {line}")
         if not scene.meshes:
-            return None
+            return None, "winding"
         surface = _joined(scene.meshes)
         if shape.type == "ply" and surface.uv is not None:
             # Our PLY reader flips v, as most programs that write PLY expect. Mitsuba does not, so undo it.
@@ -106,8 +119,21 @@ class ShapeReader:
         if flipped and surface.uv is not None:
             surface = replace(surface, uv=_flipped_v(surface.uv))
         if flat:
-            return replace(surface, normals=None)
-        return _smoothed(surface) if _is_flat(surface) else surface
+            return replace(surface, normals=None), "winding"
+        # Mitsuba computes normals that a file lacks from the triangles in the world.
+        return (_smoothed(surface), "winding") if _is_flat(surface) else (surface, "normals")
+
+
+def wound_by_normals(mesh: Mesh) -> Mesh:
+    """The mesh whose triangles all wind counter-clockwise on the side to which their normals point."""
+    first, second, third = (mesh.positions[mesh.triangles[:, i]].astype(np.float64) for i in range(3))
+    behind = np.einsum(
+        "ti,ti->t", np.cross(second - first, third - first), mesh.normals[mesh.triangles].sum(axis=1)
+    )
+    if not (behind < 0.0).any():
+        return mesh
+    triangles = np.where((behind < 0.0)[:, None], mesh.triangles[:, ::-1], mesh.triangles)
+    return replace(mesh, triangles=np.ascontiguousarray(triangles))
 
 
 def _flipped_v(uv: np.ndarray) -> np.ndarray:

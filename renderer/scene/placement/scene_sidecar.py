@@ -15,10 +15,20 @@ angles in degrees::
     intensity = 10.0            # W/sr (spot, point) or W/m² (directional): one number, or red, green, blue
     inner_cone_degrees = 35.0   # half angles, spot only
     outer_cone_degrees = 55.0
+
+    [sky]
+    radiance = [0.5, 0.6, 1.0]  # W/(m² sr), the same in all directions: one number, or red, green, blue
+    # or an equirectangular map in the scene's folder:
+    # environment = "sky.exr"   # or .hdr
+    # scale = 1.0               # a factor of its radiance
+    # rotation = 0.0            # turns it about +Y
+
+`light = []` asks for no lights at all.
 """
 
 import math
 import tomllib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +37,12 @@ from jaxtyping import Float64
 
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.small_text import read_small_text
+from vpltune.renderer.scene.files.environment_file import ENVIRONMENT_SUFFIXES, is_environment_file
 from vpltune.renderer.scene.files.limits import LARGEST_NUMBER, LARGEST_RADIOMETRIC
 from vpltune.renderer.scene.placement.automatic_camera import default_camera, default_camera_for_lights
 from vpltune.renderer.scene.placement.automatic_light import default_light
+from vpltune.renderer.scene.placement.given_sky import GivenSky
+from vpltune.renderer.scene.placement.own_light import has_own_light
 from vpltune.renderer.scene.placement.sidecar_file import near_miss, sidecar_path
 from vpltune.renderer.scene.placement.sight import lit_fraction, seen_by
 from vpltune.renderer.scene.placement.subject import space_of_view
@@ -50,6 +63,8 @@ LIGHT_KEYS: dict[LightKind, tuple[str, ...]] = {
     "point": ("type", "position", "intensity"),
     "directional": ("type", "direction", "look_at", "position", "intensity"),
 }
+# The keys that a sky may have.
+SKY_KEYS = ("radiance", "environment", "scale", "rotation")
 # A choice: largest coordinate. Scenes lie within 1e12, a sun may stand beyond; its square fits float32.
 LARGEST_PLACE = 1e18
 # A choice: most bytes of a sidecar, which usually has 500.
@@ -58,8 +73,29 @@ _LARGEST_FILE = 1 << 20
 LEAST_LIT = 0.005
 
 
-def read_sidecar(path: Path) -> tuple[Camera | None, tuple[Light, ...] | None]:
-    """The camera and the lights in a sidecar, each None if the sidecar does not give it.
+@dataclass(frozen=True, eq=False)
+class Sidecar:
+    """What a sidecar gives; None for what it does not give."""
+
+    camera: Camera | None = None
+    lights: tuple[Light, ...] | None = None
+    sky: GivenSky | None = None
+
+
+def sidecar_of(scene_path: Path) -> Sidecar:
+    """What a scene's sidecar gives, if it has one.
+
+    Raises:
+        InputError: as `read_sidecar`, or it is no file.
+    """
+    path = sidecar_path(scene_path)
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: must be a file")  # a pipe would be waited for
+    return read_sidecar(path) if path.exists() else Sidecar()
+
+
+def read_sidecar(path: Path) -> Sidecar:
+    """The contents of a sidecar.
 
     Raises:
         InputError: the file cannot be read or is not TOML, a key is unknown or missing, or a value is not
@@ -72,19 +108,21 @@ def read_sidecar(path: Path) -> tuple[Camera | None, tuple[Light, ...] | None]:
         raise InputError(f"{path}: not a sidecar (nested too deep)") from error
 
 
-def _parsed(text: str, path: Path) -> tuple[Camera | None, tuple[Light, ...] | None]:
+def _parsed(text: str, path: Path) -> Sidecar:
     try:
         document = tomllib.loads(text)
     except ValueError as error:
         raise InputError(f"{path}: not TOML ({error})") from error
-    _check_keys(document, ("camera", "light"), str(path))
+    _check_keys(document, ("camera", "light", "sky"), str(path))
     camera = _camera(document["camera"], f"{path}: [camera]") if "camera" in document else None
+    sky = _sky(document["sky"], f"{path}: [sky]") if "sky" in document else None
     if "light" not in document:
-        return camera, None
+        return Sidecar(camera, None, sky)
     entries = document["light"]
-    if not isinstance(entries, list) or not entries:
+    if not isinstance(entries, list):
         raise InputError(f"{path}: lights must be written as [[light]] tables")
-    return camera, tuple(_light(entry, f"{path}: [[light]] {i}") for i, entry in enumerate(entries))
+    lights = tuple(_light(entry, f"{path}: [[light]] {i}") for i, entry in enumerate(entries))
+    return Sidecar(camera, lights, sky)
 
 
 def resolve_camera_and_lights(
@@ -105,19 +143,16 @@ def resolve_camera_and_lights(
         InputError: the sidecar exists but is invalid, a light is too strong for the scene's size, or the
             scene has no triangles.
     """
-    path = sidecar_path(scene_path)
-    if path.exists() and not path.is_file():
-        raise InputError(f"{path}: must be a file")  # a pipe would be waited for
-    camera, lights = read_sidecar(path) if path.exists() else (None, None)
+    path, found = sidecar_path(scene_path), sidecar_of(scene_path)
     notes = []
     if camera_override is None or light_override is None:
         if path.exists():
-            notes.append(f"{' and '.join(_mentioned(camera, lights))} taken from {path.name}")
+            notes.append(f"{' and '.join(_mentioned(found))} taken from {path.name}")
         elif (missed := near_miss(scene_path)) is not None:
             notes.append(f"{missed} is not read: the scene's sidecar would be {path.name}")
     source = path if light_override is None else scene_path
-    camera = camera_override or camera
-    lights = light_override if light_override is not None else lights
+    camera = camera_override or found.camera
+    lights = light_override if light_override is not None else found.lights
     if lights is not None and scene.triangle_count():
         require_drawable(lights, scene, str(source))
     camera, lights, more = completed_camera_and_lights(scene, scene_path, camera, lights)
@@ -128,6 +163,8 @@ def completed_camera_and_lights(
     scene: Scene, where: Path | str, camera: Camera | None, lights: tuple[Light, ...] | None
 ) -> tuple[Camera, tuple[Light, ...], tuple[str, ...]]:
     """The camera and lights given, or else the scene's own, or else automatic ones; with notes.
+
+    No light is made up where surfaces glow or there is an environment.
 
     Args:
         scene: the scene.
@@ -152,7 +189,7 @@ def completed_camera_and_lights(
     if camera is None:
         camera, note = default_camera_for_lights(scene, lights) if lights else default_camera(scene)
         notes.append(note)
-    if own_lights:
+    if own_lights or (not lights and has_own_light(scene)):
         return camera, lights, tuple(notes)
     if lights:
         space = space_of_view(scene, camera)
@@ -165,9 +202,8 @@ def completed_camera_and_lights(
     return camera, (light,), (*notes, note)
 
 
-def _mentioned(camera: Camera | None, lights: tuple[Light, ...] | None) -> list[str]:
-    named = [name for name, value in (("camera", camera), ("lights", lights)) if value is not None]
-    return named or ["nothing"]
+def _mentioned(sidecar: Sidecar) -> list[str]:
+    return [name for name, value in vars(sidecar).items() if value is not None] or ["nothing"]
 
 
 def _check_keys(table: Any, allowed: tuple[str, ...], where: str) -> None:
@@ -205,6 +241,30 @@ def _camera(table: Any, where: str) -> Camera:
     if not 0.0 < degrees < 180.0:
         raise InputError(f"{where}: 'yfov_degrees' must lie between 0 and 180, got {degrees:g}")
     return Camera(look_at(eye, target), math.radians(degrees))
+
+
+def _sky(table: Any, where: str) -> GivenSky:
+    _check_keys(table, SKY_KEYS, where)
+    if ("radiance" in table) == ("environment" in table):
+        raise InputError(f"{where}: must have either 'radiance' or 'environment'")
+    if "radiance" in table:
+        _check_keys(table, SKY_KEYS[:1], where)
+        radiance = np.broadcast_to(_numbers(table, "radiance", (1, 3), where, LARGEST_RADIOMETRIC), 3)
+        if (radiance < 0.0).any():
+            raise InputError(f"{where}: 'radiance' must not be negative, got {radiance.tolist()}")
+        red, green, blue = radiance.tolist()
+        return GivenSky((red, green, blue))
+    name = table["environment"]
+    if not isinstance(name, str) or not is_environment_file(name):
+        raise InputError(
+            f"{where}: 'environment' must be a file that ends in {' or '.join(ENVIRONMENT_SUFFIXES)}, "
+            f"got {name!r:.60}"
+        )
+    filled = {"scale": 1.0, "rotation": 0.0, **table}
+    scale, rotation = (float(_numbers(filled, key, (1,), where)[0]) for key in ("scale", "rotation"))
+    if scale < 0.0:
+        raise InputError(f"{where}: 'scale' must not be negative, got {scale:g}")
+    return GivenSky(None, name, scale, rotation)
 
 
 def _light(table: Any, where: str) -> Light:

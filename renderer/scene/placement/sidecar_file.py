@@ -1,6 +1,7 @@
 """The name and the text of a scene's sidecar, `room.vpltune.toml` for `room.glb`."""
 
 import difflib
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from vpltune.renderer.scene.files.scene_reader import SCENE_SUFFIXES
+from vpltune.renderer.scene.placement.given_sky import GivenSky
 from vpltune.renderer.scene.scene import Camera, Light
 
 SIDECAR_SUFFIX = ".vpltune.toml"
@@ -88,24 +90,29 @@ def _alike(one: str, other: str) -> bool:
     return difflib.SequenceMatcher(None, one, other).ratio() >= _ALIKE
 
 
-def sidecar_text(camera: Camera, lights: Sequence[Light]) -> str:
+def sidecar_text(camera: Camera | None, lights: Sequence[Light] | None, sky: GivenSky | None = None) -> str:
     """A sidecar with these.
 
     Args:
-        camera: a roll about its view axis is lost, since a sidecar's camera has +Y up.
-        lights: at least one.
+        camera: a roll about its view axis is lost, since a sidecar's camera has +Y up. None to write none.
+        lights: empty for a scene that is to have none. None to write none; the scene's own, or an automatic
+            one, are used then.
+        sky: None to write none.
     """
-    eye = camera.position_world
-    # A target about as far away as the origin keeps its digits.
-    target = eye - camera.to_world[:3, 2] * max(1.0, float(abs(eye).max()))
-    parts = [
-        "# Lengths in world units, angles in degrees. What is left out is chosen by VPLtune.",
-        "[camera]",
-        f"eye = {_numbers(eye)}",
-        f"look_at = {_numbers(target)}",
-        f"yfov_degrees = {_number(math.degrees(camera.yfov))}",
-    ]
-    for light in lights:
+    parts = ["# Lengths in world units, angles in degrees. What is left out is chosen by VPLtune."]
+    if lights is not None and not lights:
+        parts += ["light = []  # no lights; take this line out to add [[light]] tables", ""]
+    if camera is not None:
+        eye = camera.position_world
+        # A target about as far away as the origin keeps its digits.
+        target = eye - camera.to_world[:3, 2] * max(1.0, float(abs(eye).max()))
+        parts += [
+            "[camera]",
+            f"eye = {_numbers(eye)}",
+            f"look_at = {_numbers(target)}",
+            f"yfov_degrees = {_number(math.degrees(camera.yfov))}",
+        ]
+    for light in lights or ():
         unit = "W/m²" if light.kind == "directional" else "W/sr"
         parts += ["", "[[light]]", f'type = "{light.kind}"']
         if light.kind != "directional":
@@ -116,7 +123,21 @@ def sidecar_text(camera: Camera, lights: Sequence[Light]) -> str:
         if light.kind == "spot":
             parts.append(f"inner_cone_degrees = {_number(math.degrees(light.inner_cone))}  # half angles")
             parts.append(f"outer_cone_degrees = {_number(math.degrees(light.outer_cone))}")
+    if sky is not None:
+        parts += ["", "[sky]", *_sky_lines(sky)]
     return "\n".join(parts) + "\n"
+
+
+def _sky_lines(sky: GivenSky) -> list[str]:
+    if sky.radiance is not None:
+        return [f"radiance = {_numbers(np.array(sky.radiance))}  # W/(m² sr): red, green, blue"]
+    # A JSON string is a TOML one, if the characters beyond 16 bits are written as they are.
+    lines = [f"environment = {json.dumps(sky.file, ensure_ascii=False)}"]
+    if sky.scale != 1.0:
+        lines.append(f"scale = {_number(sky.scale)}")
+    if sky.rotation_degrees:
+        lines.append(f"rotation = {_number(sky.rotation_degrees)}  # degrees about +Y")
+    return lines
 
 
 def _numbers(values: Float64[np.ndarray, "3"]) -> str:

@@ -12,6 +12,7 @@ from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.gltf_extras import write_gltf_extras
+from vpltune.renderer.config.light_settings import LightSettings
 from vpltune.renderer.config.quality import MetBudget, Quality
 from vpltune.renderer.config.tuned_config import (
     FitNote,
@@ -29,7 +30,7 @@ CONFIG = TunedConfig(
     auto=made_prior(),
     quality=Quality(interleave=4, budget=MetBudget(4.0, (640, 480), "llvmpipe")),
     fit=FitNote("kept", "the start was as good"),
-    light={"sun": [1.0, 2.5, {"on": True}]},
+    light=LightSettings(3),
 )
 
 
@@ -74,8 +75,8 @@ def test_a_file_without_a_checksum_is_read():
         ("auto", "bias", [0.5, 0.5, 0.5, 0.25]),
         ("fit", "status", "improved"),
         ("fit", "sentence", ""),
-        ("light", "sun", [1.0]),
-        ("light", "moon", []),
+        ("light", "bounces", 4),
+        ("light", "bounces", "all"),
         ("provenance", "seed", 8),
         ("provenance", "seed", "7"),
     ],

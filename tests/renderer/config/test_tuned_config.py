@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
 from vpltune.renderer.config.config_schema import config_schema
+from vpltune.renderer.config.light_settings import LightSettings
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import (
-    DEEPEST_LIGHT,
     FitNote,
     TunedConfig,
     config_text,
@@ -64,7 +64,7 @@ def test_a_config_goes_through_a_file(tmp_path):
         "transmittance",
         quality=Quality(interleave=4, rsm_resolution=256),
         fit=FitNote("kept", "the start was as good"),
-        light={"sun": [0.0, 1.0, {"name": None}]},
+        light=LightSettings("all"),
     )
     write_config(tmp_path / "tuned.json", config)
     assert read_config(tmp_path / "tuned.json") == config
@@ -82,12 +82,11 @@ def test_lloyd_iterations_stand_in_the_quality_part():
         parse_config(json.dumps(moved), "text")
 
 
-def test_light_is_kept_and_not_acted_on():
-    light = {"key": {"kind": "sun", "turns": [1, 2.5, None, True, "é\ud800"]}}
-    config = parse_config(json.dumps(document(light=light)), "text")
-    assert config.light == light
-    assert json.loads(config_text(config))["light"] == light
-    assert config.draws_as(TunedConfig())
+@pytest.mark.parametrize("bounces", [1, 2, 64, "all", 3.0])
+def test_bounces_are_read_and_written(bounces):
+    config = parse_config(json.dumps(document(light={"bounces": bounces})), "text")
+    assert config.light == LightSettings(int(bounces) if bounces != "all" else "all")
+    assert parse_config(config_text(config), "text").light == config.light
 
 
 def test_an_empty_light_or_provenance_is_not_written():
@@ -95,16 +94,22 @@ def test_an_empty_light_or_provenance_is_not_written():
     assert not {"light", "provenance", "fit", "auto"} & set(json.loads(config_text(config)))
 
 
-def test_a_light_too_deep_or_not_finite_is_refused():
-    """It could be read, but not written again."""
-    deep = document(light={"a": "@"})
-    nested = "[" * (DEEPEST_LIGHT - 2) + "]" * (DEEPEST_LIGHT - 2)
-    parse_config(json.dumps(deep).replace('"@"', nested), "text")
-    with pytest.raises(InputError, match=f"text: light: must have at most {DEEPEST_LIGHT} levels"):
-        parse_config(json.dumps(deep).replace('"@"', f"[[{nested}]]"), "text")
-    for literal in ("NaN", "1e999", '[{"b": -1e999}]'):
-        with pytest.raises(InputError, match="text: light: numbers must be finite, got"):
-            parse_config(json.dumps(deep).replace('"@"', literal), "text")
+@pytest.mark.parametrize(
+    ("light", "said"),
+    [
+        ({"bounces": 0}, 'light.bounces: must be "all" or a whole number from 1 to 64, got 0'),
+        ({"bounces": 65}, "light.bounces: must be"),
+        ({"bounces": 1.5}, "light.bounces: must be"),
+        ({"bounces": True}, "light.bounces: must be"),
+        ({"bounces": "some"}, "light.bounces: must be"),
+        ({"bounces": [1]}, "light.bounces: must be"),
+        ({"bounce": 1}, "light: unknown key 'bounce'; known are bounces, sky_lights"),
+        ([], "light: must be an object, got list"),
+    ],
+)
+def test_light_settings_out_of_range_are_refused(light, said):
+    with pytest.raises(InputError, match=re.escape(f"text: {said}")):
+        parse_config(json.dumps(document(light=light)), "text")
 
 
 def test_a_fit_note_may_be_without_a_sentence():
@@ -123,14 +128,15 @@ def test_with_parameters_replaces_parameters_and_prior_alone():
 
 
 def test_configs_that_draw_alike():
-    """Parameters, visibility, prior and quality decide an image; what the file says beside them does not."""
+    """Parameters, visibility, prior, quality and light decide an image; nothing else in the file does."""
     config = TunedConfig()
-    said = TunedConfig(provenance={"seed": 1}, fit=FitNote("kept"), light={"a": 1})
+    said = TunedConfig(provenance={"seed": 1}, fit=FitNote("kept"))
     assert config.draws_as(said)
     for other in (
         TunedConfig(ArtistParameters(intensity=2.0)),
         TunedConfig(visibility="transmittance"),
         TunedConfig(quality=Quality(interleave=2)),
+        TunedConfig(light=LightSettings(2)),
         TunedConfig(ArtistParameters(lloyd_iterations=0)),
         read_config("auto"),
     ):
@@ -150,7 +156,6 @@ def test_an_out_of_range_config_is_not_written(tmp_path):
         (TunedConfig(ArtistParameters(intensity=-1.0)), "parameters.intensity: must be"),
         (TunedConfig(ArtistParameters(lloyd_iterations=17)), "quality.lloyd_iterations: must be"),
         (TunedConfig(provenance={"seconds": math.inf}), "provenance.'seconds' must be"),
-        (TunedConfig(light={"a": [math.nan]}), "light: numbers must be finite"),
     ):
         with pytest.raises(InputError, match=message):
             write_config(tmp_path / "tuned.json", config)
@@ -191,7 +196,7 @@ REFUSED = {
     "extra key": (json.dumps(document(notes="")), "unknown key 'notes'; known are format, version"),
     "parameters a list": (json.dumps(document(parameters=[])), "'parameters' must be an object, got list"),
     "quality a list": (json.dumps(document(quality=[])), "'quality' must be an object, got list"),
-    "light a list": (json.dumps(document(light=[])), "'light' must be an object, got list"),
+    "light a list": (json.dumps(document(light=[])), "light: must be an object, got list"),
     "fit a string": (json.dumps(document(fit="kept")), "'fit' must be an object, got str"),
     "fit null": (json.dumps(document(fit=None)), "'fit' must be an object, got NoneType"),
     "NaN": (text_with("parameters", "intensity", "NaN"), "parameters.intensity: must be .* got nan"),

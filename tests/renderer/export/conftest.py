@@ -6,8 +6,8 @@ from headless_chromium import headless_chromium
 
 
 @pytest.fixture(scope="module")
-def browser():
-    with headless_chromium(*SOFTWARE_GL) as browser:
+def browser(playwright):
+    with headless_chromium(playwright, *SOFTWARE_GL) as browser:
         yield browser
 
 

@@ -37,7 +37,7 @@ def _rich_scene() -> Scene:
         ),
         materials=(
             Material("one", np.float32([1.0 / 3.0, 0.0, 1.0])),
-            Material("two", np.float32([0.1, 0.2, 0.3]), 0),
+            Material("two", np.float32([0.1, 0.2, 0.3]), 0, emission=(0.5, 0.25, 0.0), emits_both_ways=True),
             Material("holes", np.float32([0.1, 0.2, 0.3]), 1, "mask", 0.75, 0.25),
         ),
         textures=(
@@ -77,7 +77,9 @@ def test_everything_comes_back(tmp_path, scene):
         assert (mine.name, mine.mesh) == (other.name, other.mesh)
     for mine, other in zip(scene.materials, read.materials, strict=True):
         np.testing.assert_array_equal(mine.base_color, other.base_color)
-        assert mine.texture == other.texture
+        assert (mine.texture, mine.emission_texture) == (other.texture, other.emission_texture)
+        np.testing.assert_allclose(mine.emission, other.emission, rtol=1e-15)
+        assert not mine.glows or mine.emits_both_ways == other.emits_both_ways
         assert (mine.alpha_mode, mine.opacity) == (other.alpha_mode, other.opacity)
         assert mine.is_opaque or mine.alpha_cutoff == other.alpha_cutoff
     for mine, other in zip(scene.textures, read.textures, strict=True):
@@ -98,6 +100,32 @@ def test_everything_comes_back(tmp_path, scene):
             np.testing.assert_allclose(mine.direction_world, other.direction_world, atol=1e-15)
         if mine.kind == "spot":
             assert (mine.inner_cone, mine.outer_cone) == (other.inner_cone, other.outer_cone)
+
+
+def test_strong_textured_emission_comes_back(tmp_path):
+    texels = np.random.default_rng(2).integers(0, 256, (4, 4, 3)).astype(np.uint8)
+    sheet = quad((0, 0, 0), (1, 0, 0), (0, 1, 0))
+    mirror = np.diag([1.0, 1.0, -1.0, 1.0])
+    glow = Material("glow", np.zeros(3, np.float32), emission=(300.0, 20.0, 1e-3), emission_texture=0)
+    scene = Scene(
+        "glow",
+        (replace(sheet, uv=np.float32([[0, 0], [1, 0], [1, 1], [0, 1]])),),
+        (Instance("plain", 0, np.eye(4)), Instance("mirrored", 0, mirror)),
+        (glow,),
+        (Texture("pattern", texels),),
+    )
+    write_glb(tmp_path / "written.glb", scene)
+    read = read_scene(tmp_path / "written.glb")
+    (material,) = read.materials
+    np.testing.assert_allclose(material.emission, glow.emission, rtol=1e-15)
+    assert (material.emission_texture, material.emits_both_ways) == (0, False)
+    np.testing.assert_array_equal(read.textures[0].texels_srgb, texels)
+    for instance, wanted in zip(read.instances, scene.instances, strict=True):
+        # The front, which alone shines, is wound as it was, although glTF's is clockwise in a mirror.
+        mesh = read.meshes[instance.mesh]
+        np.testing.assert_array_equal(mesh.positions, scene.meshes[0].positions)
+        np.testing.assert_array_equal(mesh.triangles, scene.meshes[wanted.mesh].triangles)
+        np.testing.assert_allclose(mesh.normals, scene.meshes[0].normals, atol=1e-7)
 
 
 def test_trimesh_reads_the_same_areas(tmp_path):

@@ -9,6 +9,7 @@ from examples.formulas.virtual_point_lights import DARK_NORMAL, Vpls
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.frame.disc_samples import sample_count
 from vpltune.renderer.frame.passes.clustered_discs import ClusteredDiscsPass
+from vpltune.renderer.frame.vpl_pools import DiscPool
 from vpltune.renderer.gpu.resources import Resources
 
 LENGTH = 0.6
@@ -40,18 +41,20 @@ class Clustering:
 
     def __init__(self, gl_context, samples: Vpls, count: int):
         self.resources = Resources(gl_context)
-        self.resources["vpl_samples"] = buffer_of(gl_context, vpl_rows(vars(samples)))
-        self.resources["virtual_point_lights"] = gl_context.buffer(reserve=48 * count)
-        self.resources["frame_statistics"] = buffer_of(gl_context, np.float32([1.0, 1.0, LENGTH, 1.0]))
+        self.resources["first_samples"] = buffer_of(gl_context, vpl_rows(vars(samples)))
+        self.resources["first_vpls"] = gl_context.buffer(reserve=48 * count)
+        self.resources["frame_statistics"] = buffer_of(
+            gl_context, np.float32([1.0, 1.0, LENGTH, 1.0, 0.0, 0.0, 0.0, 0.0])
+        )
         self._count = count
-        self._pass = ClusteredDiscsPass(self.resources, count)
+        self._pass = ClusteredDiscsPass(self.resources, DiscPool.first(count))
 
     def clustered(self, iterations: int) -> np.ndarray:
         """[vpls, 12], as shaders have them."""
         light = light_of(VECTORS["rsm"]["light"])
         parameters = ArtistParameters(vpl_count=self._count, lloyd_iterations=iterations)
         self._pass.draw(inputs_of(light, parameters))
-        return np.frombuffer(self.resources.read("virtual_point_lights"), np.float32).reshape(-1, 12)
+        return np.frombuffer(self.resources.read("first_vpls"), np.float32).reshape(-1, 12)
 
 
 @pytest.mark.parametrize("count", [1, 50, 100])

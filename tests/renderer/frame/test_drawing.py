@@ -208,7 +208,7 @@ def test_what_a_config_says_beside_its_settings_makes_no_frame(gl_context):
     runtime.draw(VIEW, PLAIN)
     frame = runtime.draw(VIEW, PLAIN).frame
     for config in (
-        replace(PLAIN, provenance={"seed": 1}, fit=FitNote("kept"), light={"a": 1}),
+        replace(PLAIN, provenance={"seed": 1}, fit=FitNote("kept")),
         CONFIGS["brighter"],
         CONFIGS["by importance"],
         CONFIGS["discs"],
@@ -223,7 +223,7 @@ def test_few_frames_are_kept(gl_context):
     assert KEPT_FRAMES == 2
     runtime = Runtime(colored_room(), context=gl_context)
     configs = [with_quality(interleave=side) for side in (1, 2, 4, 8)]
-    setups = [FrameSetup.of(VIEW, config, nested_faces=0) for config in configs]
+    setups = [FrameSetup.of(VIEW, config, nested_faces=0, glows=False) for config in configs]
     for config in configs * 2:
         runtime.draw(VIEW, config)
         assert len(runtime._frames) <= KEPT_FRAMES

@@ -9,8 +9,9 @@ from built_scenes import colored_room, quad, room_view, scene_of
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.drawn_frame import DrawnFrame
 from vpltune.renderer.frame.passes import receiver_bounds
-from vpltune.renderer.frame.runtime import DrawnFrame, Runtime
+from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.frame.visibility_map_layout import FEW_LOOKED_UP
 from vpltune.renderer.scene.scene import Camera, Light, Scene
 from vpltune.renderer.scene.transforms import look_at

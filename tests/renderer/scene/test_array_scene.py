@@ -9,6 +9,7 @@ from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.srgb import linear_from_srgb
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.array_scene import scene_from_arrays
+from vpltune.renderer.scene.environment import Environment, even_sky
 from vpltune.renderer.scene.scene import Camera, Light, Material, Scene
 from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
@@ -116,6 +117,16 @@ BROKEN = {
         "texture": np.zeros((1, 16385, 3), np.uint8),
         "uv": SQUARE[:, :2],
     },
+    "emission: must be from 0 to 1e+18, got -1": {"emission": -1.0},
+    "emission: must be from 0 to 1e+18, got nan": {"emission": [0.0, np.nan, 1.0]},
+    "emission: must be from 0 to 1e+18, got 1e+30": {"emission": 1e30},
+    "emission: must be one number or RGB, got [2]": {"emission": [1.0, 1.0]},
+    "environment: radiance must be from 0 to 1e+18, got -1 to 1": {
+        "environment": even_sky((1.0, -1.0, 1.0)),
+    },
+    "environment: radiance must be from 0 to 1e+18, got nan to nan": {
+        "environment": even_sky((np.nan, 1.0, 1.0)),
+    },
     "lights[0].intensity: must not be negative": {"lights": [Light("point", -1.0)]},
     "lights[0].intensity: must be 3 finite numbers": {"lights": [Light("point", np.nan)]},
     "lights[0]: cone angles must satisfy": {"lights": [Light("spot", 1.0, inner_cone=1.0, outer_cone=0.5)]},
@@ -131,6 +142,23 @@ def test_a_broken_rule_is_one_line_with_argument_and_value(message):
         scene_from_arrays(**{"positions": SQUARE, "triangles": HALVES, **BROKEN[message]})
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_emission_and_environment_are_taken():
+    scene = scene_from_arrays(
+        SQUARE,
+        HALVES,
+        emission=[3.0, 2.0, 1.0],
+        emits_both_ways=True,
+        environment=Environment(np.ones((600, 1200, 3), np.float32)),
+    )
+    (material,) = scene.materials
+    assert (material.emission, material.emits_both_ways) == ((3.0, 2.0, 1.0), True)
+    assert scene.environment is not None
+    assert scene.environment.radiance.shape == (512, 1024, 3)
+    np.testing.assert_allclose(scene.environment.radiance, 1.0, rtol=1e-6)
+    assert scene_from_arrays(SQUARE, HALVES).environment is None
+    assert scene_from_arrays(SQUARE, HALVES, emission=2).materials[0].emission == (2.0, 2.0, 2.0)
 
 
 def test_a_spots_hard_edge_is_softened_as_in_a_file():

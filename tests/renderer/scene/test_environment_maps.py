@@ -57,20 +57,18 @@ def test_a_large_environment_stays_within_the_bounds_of_reading(tmp_path):
 
 @pytest.mark.parametrize("size", [(5, 7), (24, 48), (31, 100)])
 @pytest.mark.parametrize("dtype", [np.float16, np.float32])
-def test_the_light_is_that_of_the_brightest_pixels(tmp_path, size, dtype):
-    """One bright pixel: its direction to a cell of the coarse map, its irradiance by its solid angle."""
-    rows, columns = size
-    row, column = rows // 3, columns // 5
-    pixels = np.zeros((rows, columns, 3), dtype)
-    pixels[row, column] = (8.0, 4.0, 2.0)
+def test_texels_are_kept_and_scaled(tmp_path, size, dtype):
+    pixels = np.random.default_rng(1).uniform(0.0, 9.0, (*size, 3)).astype(dtype)
     scene = read_mitsuba(scene_with(tmp_path, {"RGB": pixels}, '<float name="scale" value="3"/>'))
-    (light,) = scene.lights
-    polar, azimuth = np.pi * (row + 0.5) / rows, 2 * np.pi * (column + 0.5) / columns
-    towards = (np.sin(polar) * np.sin(azimuth), np.cos(polar), -np.sin(polar) * np.cos(azimuth))
-    # A cell is 7.5° wide, or one pixel where there are fewer of these.
-    assert -light.direction_world @ towards > np.cos(np.radians(7.5))
-    solid_angle = 2 * np.pi / columns * np.pi / rows * np.sin(polar)
-    np.testing.assert_allclose(light.intensity, 3.0 * solid_angle * np.array([8.0, 4.0, 2.0]), rtol=1e-6)
+    np.testing.assert_allclose(scene.environment.radiance, 3.0 * pixels.astype(np.float32), rtol=1e-6)
+    assert scene.lights == ()
+
+
+@pytest.mark.parametrize("scale", ["-1", "1e30"])
+def test_the_scale_is_bounded(tmp_path, scale):
+    pixels = np.ones((2, 4, 3), np.float32)
+    with pytest.raises(InputError, match=r"emitter 'envmap': 'scene\.exr': .*must be"):
+        read_mitsuba(scene_with(tmp_path, {"RGB": pixels}, f'<float name="scale" value="{scale}"/>'))
 
 
 @pytest.mark.parametrize("value", [-1.0, np.inf, np.nan])

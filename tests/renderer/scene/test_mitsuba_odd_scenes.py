@@ -11,6 +11,7 @@ from PIL import Image
 from reading_cost import MITSUBA, check_cost
 
 from vpltune.renderer.errors import InputError
+from vpltune.renderer.files.srgb import linear_from_srgb
 from vpltune.renderer.scene.files.limits import MAX_INSTANCES, MAX_PLACED_VERTICES
 from vpltune.renderer.scene.mitsuba_import import read_mitsuba
 from vpltune.renderer.scene.scene import Instance, Mesh, Scene
@@ -201,42 +202,75 @@ GLOWING = '<shape type="rectangle"><emitter type="area">{}</emitter></shape>'
 GLOWING = GLOWING.format('<texture type="{}" name="radiance">{}</texture>')
 
 
-@pytest.mark.parametrize(
-    ("kind", "inner", "mean"),
-    [
-        # sRGB's 188 is 0.503 of 255 in linear light (IEC 61966-2-1): the halves' mean, not the mean's half.
-        ("bitmap", '<string name="filename" value="map.png"/>', (0.5 * 0.50289, 0.0, 0.5)),
-        ("bitmap", '<string name="filename" value="map.png"/>' + RAW, (0.5 * 188 / 255, 0.0, 0.5)),
-        ("bitmap", '<string name="filename" value="map.exr"/>', (6.0, 3.0, 0.0)),
-        (
-            "checkerboard",
-            '<rgb name="color0" value="8 0 2"/><rgb name="color1" value="2 4 0"/>',
-            (5.0, 2.0, 1.0),
-        ),
-    ],
-    ids=["sRGB", "linear", "EXR", "checkerboard"],
-)
-def test_a_textured_radiance_becomes_its_mean_with_a_word(tmp_path, kind, inner, mean):
-    texels = np.zeros((200, 4, 3), np.uint8)
-    texels[:100, :, 0], texels[100:, :, 2] = 188, 255
+def glowing_material(scene):
+    (material,) = (scene.materials[mesh.material] for mesh in scene.meshes)
+    return material
+
+
+def test_a_bitmap_of_radiance_is_an_emission_texture(tmp_path):
+    texels = np.random.default_rng(1).integers(0, 256, (4, 4, 3)).astype(np.uint8)
     Image.fromarray(texels).save(tmp_path / "map.png")
-    pixels = np.zeros((2, 2, 3), np.float32)
+    inner = '<string name="filename" value="map.png"/><transform name="to_uv"><scale x="3"/></transform>'
+    scaled = f'<texture type="bitmap">{inner}</texture><float name="scale" value="10"/>'
+    scene = read(tmp_path, GLOWING.format("scale", scaled))
+    material = glowing_material(scene)
+    assert material.emission == (10.0, 10.0, 10.0)
+    np.testing.assert_array_equal(scene.textures[material.emission_texture].texels_srgb, texels)
+    assert scene.meshes[0].uv[:, 0].max() == 3.0
+    assert scene.warnings == ()
+
+
+@pytest.mark.parametrize("darkest", [1.0, 1e-6])
+def test_a_bright_bitmap_becomes_a_factor_and_a_texture(tmp_path, darkest):
+    pixels = np.full((2, 2, 3), darkest, np.float32)
     pixels[0] = (12.0, 6.0, 0.0)
     OpenEXR.File({}, {"RGB": pixels}).write(str(tmp_path / "map.exr"))
-    scene = read(tmp_path, GLOWING.format(kind, inner))
-    (light,) = scene.lights
-    # A spot of a square of 4 m² has 3/2 · A · L. Raw texels are kept in 8 bits, as sRGB: half a step of 255.
-    np.testing.assert_allclose(light.intensity, 6.0 * np.array(mean), rtol=5e-3)
-    (said,) = [line for line in scene.warnings if "radiance" in line]
-    assert f"its mean, {light.intensity[0] / 6.0:.3g}, " in said and (
-        "map." in said or "checkerboard" in said
-    )
+    scene = read(tmp_path, GLOWING.format("bitmap", '<string name="filename" value="map.exr"/>'))
+    material = glowing_material(scene)
+    np.testing.assert_allclose(material.emission, (12.0, 6.0, darkest), rtol=1e-6)
+    linear = linear_from_srgb(scene.textures[material.emission_texture].texels_srgb / 255.0)
+    # Half a step of eight bits, at most 0.5 % of the largest value.
+    np.testing.assert_allclose(linear * material.emission, pixels, atol=0.06)
+    assert any("spans more than eight bits hold" in line for line in scene.warnings) == (darkest < 1e-3)
+
+
+def test_other_textures_of_radiance_count_by_their_mean_with_a_word(tmp_path):
+    inner = '<rgb name="color0" value="8 0 2"/><rgb name="color1" value="2 4 0"/>'
+    scene = read(tmp_path, GLOWING.format("checkerboard", inner))
+    material = glowing_material(scene)
+    assert (material.emission, material.emission_texture) == ((5.0, 2.0, 1.0), None)
+    (said,) = scene.warnings
+    assert "its mean, 5, 2, 1 " in said
+    assert "checkerboard" in said
+
+
+def test_textures_of_radiance_and_colour_that_lie_otherwise(tmp_path):
+    """A mesh has one set of texture coordinates."""
+    Image.new("RGB", (2, 2)).save(tmp_path / "map.png")
+    bitmap = '<texture type="bitmap" name="{}"><string name="filename" value="map.png"/>{}</texture>'
+    moved = '<transform name="to_uv"><scale x="3"/></transform>'
+    bsdf = f'<bsdf type="diffuse">{bitmap.format("reflectance", moved)}</bsdf>'
+    shape = '<shape type="rectangle">{}<emitter type="area">{}</emitter></shape>'
+    scene = read(tmp_path, shape.format(bsdf, bitmap.format("radiance", "")))
+    material = glowing_material(scene)
+    assert material.texture is None
+    assert material.emission_texture is not None
+    assert any("which is dropped" in line for line in scene.warnings)
+    alike = glowing_material(read(tmp_path, shape.format(bsdf, bitmap.format("radiance", moved))))
+    assert alike.texture == alike.emission_texture
 
 
 def test_a_scaled_radiance_is_scaled(tmp_path):
     inner = '<texture type="checkerboard"/><float name="scale" value="10"/>'
-    (light,) = read(tmp_path, GLOWING.format("scale", inner)).lights
-    np.testing.assert_allclose(light.intensity, 6.0 * 3.0, rtol=1e-12)  # the mean of 0.4 and 0.2
+    material = glowing_material(read(tmp_path, GLOWING.format("scale", inner)))
+    np.testing.assert_allclose(material.emission, 3.0, rtol=1e-12)  # the mean of 0.4 and 0.2
+
+
+def test_a_second_environment_is_left_out(tmp_path):
+    two = '<emitter type="constant"/><emitter type="constant"><rgb name="radiance" value="5"/></emitter>'
+    scene = read(tmp_path, CUBE + two)
+    np.testing.assert_array_equal(scene.environment.radiance, 1.0)
+    assert any("a scene has one environment" in line for line in scene.warnings)
 
 
 def test_an_absent_environment_is_said(tmp_path):
@@ -318,17 +352,26 @@ def test_why_no_triangle_is_left_is_said(tmp_path):
         read(tmp_path, glass)
 
 
+AREA = '<shape type="rectangle"><emitter type="area"><rgb name="radiance" value="{}"/></emitter></shape>'
+CONSTANT = '<emitter type="constant"><rgb name="radiance" value="{}"/></emitter>'
+
+
 @pytest.mark.parametrize(
-    "emitter",
+    ("emitter", "said"),
     [
-        '<emitter type="point"><rgb name="intensity" value="6e19"/></emitter>',
-        '<shape type="rectangle"><emitter type="area"><rgb name="radiance" value="1e19"/></emitter></shape>',
+        (
+            '<emitter type="point"><rgb name="intensity" value="6e19"/></emitter>',
+            r"intensity must be at most 1e\+18 W/sr .*, got 6e\+19",
+        ),
+        (AREA.format("1e19"), r"emitter 'area': radiance must be from 0 to 1e\+18"),
+        (AREA.format("-1"), "must not be negative"),
+        (AREA.format("nan"), "must be 1 finite number"),
+        (CONSTANT.format("1e19"), r"emitter 'constant': radiance must be from 0 to 1e\+18"),
     ],
-    ids=["point", "area"],
 )
-def test_a_light_that_no_scene_file_may_hold_is_refused(tmp_path, emitter):
+def test_a_light_that_no_scene_file_may_hold_is_refused(tmp_path, emitter, said):
     """A .glb of it could not be read again."""
-    with pytest.raises(InputError, match=r"intensity must be at most 1e\+18 W/sr .*, got 6e\+19"):
+    with pytest.raises(InputError, match=said):
         read(tmp_path, CUBE + emitter)
 
 

@@ -69,7 +69,7 @@ def of_sidecar(folder, inner, outer):
         f"""[[light]]\ntype = "spot"\nposition = [0, 1, 0]\ndirection = [0, -1, 0]\nintensity = 1
         inner_cone_degrees = {math.degrees(inner)!r}\nouter_cone_degrees = {math.degrees(outer)!r}\n"""
     )
-    _, (light,) = read_sidecar(folder / "a.vpltune.toml")
+    (light,) = read_sidecar(folder / "a.vpltune.toml").lights
     return light.inner_cone, light.outer_cone
 
 

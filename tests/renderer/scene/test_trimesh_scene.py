@@ -83,6 +83,14 @@ def test_colours_of_vertices_and_faces_are_srgb(trimesh):
         np.testing.assert_allclose(mesh.colors, np.broadcast_to(linear, mesh.colors.shape), rtol=1e-6)
 
 
+def test_emissive_factors_are_emission(trimesh):
+    mesh = trimesh.creation.box()
+    material = trimesh.visual.material.PBRMaterial(emissiveFactor=[1.0, 0.5, 0.0], doubleSided=True)
+    mesh.visual = trimesh.visual.TextureVisuals(uv=np.zeros((len(mesh.vertices), 2)), material=material)
+    (made,) = scene_from_trimesh(mesh).materials
+    assert (made.emission, made.emits_both_ways) == ((1.0, 0.5, 0.0), True)
+
+
 def test_shading_is_flat_unless_asked(trimesh):
     box = trimesh.creation.box()
     flat, smooth = (scene_from_trimesh(box, smooth=smooth).meshes[0] for smooth in (False, True))

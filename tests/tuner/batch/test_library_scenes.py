@@ -12,12 +12,14 @@ from reading_cost import BATCH, check_cost
 from scene_paths import OUTSIDE_SCENES
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import LightSettings
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, config_text
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
-from vpltune.tuner.batch.job import JobOptions
+from vpltune.renderer.scene.placement.given_sky import GivenSky
+from vpltune.tuner.batch.job import Job, JobOptions
 from vpltune.tuner.batch.job_key import SceneInputs, job_key
 from vpltune.tuner.batch.referred_files import referred_files
 from vpltune.tuner.batch.scene_files import library_scenes
@@ -214,14 +216,13 @@ def test_a_file_just_changed_is_not_trusted(tmp_path):
     assert not (tmp_path / "inputs.json").exists()
 
 
-def test_the_key_follows_options_but_not_where_the_start_came_from():
+def test_the_key_follows_options_but_not_where_the_start_came_from(tmp_path):
     plain = JobOptions(start=config_text(TunedConfig()))
     sourced = replace(plain, start=config_text(TunedConfig(provenance={"scene": "other"})))
     assert job_key("d", plain) == job_key("d", sourced)
     others = [
         replace(plain, views=3),
         replace(plain, seed=1),
-        replace(plain, bounces="all"),
         replace(plain, size=(64, 48)),
         replace(plain, start=config_text(TunedConfig(visibility="transmittance"))),
         replace(plain, start=config_text(TunedConfig(ArtistParameters(lloyd_iterations=0)))),
@@ -229,9 +230,42 @@ def test_the_key_follows_options_but_not_where_the_start_came_from():
         replace(plain, start=config_text(TunedConfig(quality=Quality(map_size=8)))),
         replace(plain, start=config_text(TunedConfig(quality=Quality(map_refinement=1)))),
         replace(plain, start=config_text(TunedConfig(quality=Quality(rsm_resolution=256)))),
-        replace(plain, start=config_text(TunedConfig(light={"radius": 1.0}))),
+        replace(plain, start=config_text(TunedConfig(light=LightSettings("all")))),
+        replace(plain, sky=(1.0, 1.0, 1.0)),
+        replace(plain, environment=str(tmp_path / "absent.exr")),
     ]
-    assert len({job_key("d", options) for options in [plain, *others]} | {job_key("e", plain)}) == 13
+    assert len({job_key("d", options) for options in [plain, *others]} | {job_key("e", plain)}) == 14
+
+
+def test_the_key_follows_what_is_in_an_environment(tmp_path):
+    plain = JobOptions(start=config_text(TunedConfig()))
+    contents = {"a.hdr": b"one", "b.hdr": b"two", "c.hdr": b"one"}
+    for name, content in contents.items():
+        (tmp_path / name).write_bytes(content)
+    first, second, third = (
+        job_key("d", replace(plain, environment=str(tmp_path / name))) for name in contents
+    )
+    assert first == third != second
+
+
+def test_the_environment_of_a_sidecar_is_referred_to(tmp_path):
+    (tmp_path / "a.vpltune.toml").write_text('[sky]\nenvironment = "maps/sky.hdr"\n')
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\n")
+    (tmp_path / "a.mtl").write_text("newmtl a\nmap_Ke glow.png\nmap_d holes.png\n")
+    names = ("a.mtl", "glow.png", "holes.png", "maps/sky.hdr")
+    assert referred_files(tmp_path / "a.obj") == tuple(tmp_path / name for name in names)
+    (tmp_path / "a.vpltune.toml").write_text('[sky]\nenvironment = "../sky.hdr"\n')
+    assert len(referred_files(tmp_path / "a.obj")) == 3
+
+
+def test_jobs_carry_their_sky(tmp_path):
+    options = JobOptions(start=config_text(TunedConfig()), sky=(1.0, 2.0, 3.0), size=(8, 6))
+    job = Job("k", "scene.glb", "scene", str(tmp_path), options)
+    assert Job.from_json(job.to_json()) == job
+    assert job.options.fit_options(None).sky == GivenSky((1.0, 2.0, 3.0))
+    there = replace(options, sky=None, environment="/sky.exr")
+    assert there.fit_options(None).sky == GivenSky(file="/sky.exr")
+    assert replace(options, sky=None).fit_options(None).sky is None
 
 
 def test_scenes_of_others_are_found_and_what_is_left_is_mitsubas(scenes_folder, tmp_path):

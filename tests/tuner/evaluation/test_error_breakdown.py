@@ -1,6 +1,5 @@
 """The error split by cause: what each share is when the cause is known."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 
 from vpltune import configs
 from vpltune.cli.metrics_table import error_breakdown_table
-from vpltune.cli.program import run
 
 CORNELL = Path(configs.__file__).parent / "scenes" / "cornell-box.glb"
 
@@ -74,17 +72,6 @@ def test_the_table_is_sorted_and_absent_without_a_split(budgets):
     assert "visibility" in lines[0]
     assert "remainder" in lines[-2]
     assert "all" in lines[-1]
-
-
-@pytest.mark.slow
-def test_all_bounces_have_a_share_of_their_own(tmp_path, capfd):
-    """One bounce is fitted to all: what is missing shows, and is named."""
-    views = tmp_path / "views.json"
-    _small_views(views)
-    command = ["evaluate", str(CORNELL), "--config", "default", "--views", str(views), "--json"]
-    assert run([*command, "--split-error", "--bounces", "all"]) == 0
-    budget = json.loads(capfd.readouterr().out)["error_breakdown"]
-    assert budget["missing_bounces"] != 0.0
 
 
 def _small_views(path):

@@ -31,6 +31,6 @@ def fit_copy(fitted_folder, tmp_path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def chromium():
-    with headless_chromium() as browser:
+def chromium(playwright):
+    with headless_chromium(playwright) as browser:
         yield browser

@@ -6,8 +6,8 @@ from headless_chromium import headless_chromium
 
 
 @pytest.fixture(scope="session")
-def chromium():
-    with headless_chromium() as browser:
+def chromium(playwright):
+    with headless_chromium(playwright) as browser:
         yield browser
 
 

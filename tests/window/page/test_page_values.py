@@ -153,3 +153,20 @@ def test_a_new_spot_looks_along_the_camera(run_module):
     assert spot["direction"] == pytest.approx([0, 0, -1])
     assert spot["intensity"] == [12, 12, 12]  # 3 W/m² at 2 units
     assert 0 <= spot["inner_cone"] < spot["outer_cone"] <= math.pi / 2
+
+
+@pytest.mark.parametrize("first", ["state", "scene"])
+def test_listeners_are_called_once_in_the_order_in_which_they_came(run_module, first):
+    """What makes rows comes before what fills them: where the state was told first, they stayed empty."""
+    body = """
+      const model = new m.Model();
+      const called = [];
+      model.on(["scene"], () => called.push("make"));
+      model.on(["scene", "state"], () => called.push("fill"));
+      model.on(["timings"], () => called.push("other"));
+      model.changed(given);
+      model.changed("scene", "state");
+      await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+      return called;
+    """
+    assert run_module("talk/model.js", body, first) == ["make", "fill"]

@@ -42,16 +42,14 @@ export class Model {
   /** Values that were sent and have not come back. @type {Map<string, {value: any, held: boolean}>} */
   pending = new Map();
 
-  /** @type {Map<Topic, Set<() => void>>} */ #listeners = new Map();
+  /** In the order of `on`. @type {{topics: Topic[], listener: () => void}[]} */ #listeners = [];
   /** @type {Set<Topic>} */ #told = new Set();
 
-  /** Calls `listener` in the next frame after one of the topics has changed.
+  /** Calls `listener` once in the next frame after topics have changed. Listeners are called in the order in
+   * which they came: what makes elements comes before what fills them, whichever topic changed first.
    * @param {Topic[]} topics @param {() => void} listener */
   on(topics, listener) {
-    for (const topic of topics) {
-      if (!this.#listeners.has(topic)) this.#listeners.set(topic, new Set());
-      this.#listeners.get(topic)?.add(listener);
-    }
+    this.#listeners.push({ topics, listener });
   }
 
   /** @param {...Topic} topics */
@@ -61,11 +59,9 @@ export class Model {
   }
 
   #tell() {
-    const topics = [...this.#told];
+    const told = new Set(this.#told);
     this.#told.clear();
-    // A listener of several topics is called once.
-    const listeners = new Set(topics.flatMap((topic) => [...(this.#listeners.get(topic) ?? [])]));
-    for (const listener of listeners) listener();
+    for (const { topics, listener } of this.#listeners) if (topics.some((topic) => told.has(topic))) listener();
   }
 
   /** The source whose values the panel shows. @returns {ConfigSource} */

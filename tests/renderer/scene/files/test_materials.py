@@ -183,7 +183,7 @@ def test_images_that_no_base_colour_uses_are_not_opened(triangle):
 @pytest.mark.parametrize(
     ("material", "warning"),
     [
-        ({"emissiveFactor": [0, 1, 0]}, "1 material emits light; emission does not light the scene yet"),
+        ({"emissiveFactor": [0, 1, 0]}, None),
         ({"alphaMode": "BLEND"}, None),
         (
             {
@@ -228,11 +228,36 @@ def test_what_a_diffuse_model_leaves_out_is_said(triangle, material, warning):
     assert read_scene(triangle.write()).warnings == ((warning,) if warning else ())
 
 
+@pytest.mark.parametrize(
+    ("image", "cause"),
+    [
+        ({"uri": "metal.png"}, "images[0].uri: 'metal.png' cannot be read (No such file or directory)"),
+        ({"uri": "data:image/png;base64,aGVsbG8="}, "images[0]"),
+        ({"uri": "../metal.png"}, "images[0]"),
+    ],
+)
+def test_a_metallic_image_that_cannot_be_read_leaves_the_factor(triangle, image, cause):
+    """What dims a surface is no reason to refuse it, as a missing base colour is. It is tried once."""
+    triangle.add("images", image)
+    triangle.add("textures", {"source": 0})
+    for factor in (0.25, 0.5):
+        surface = {"metallicFactor": factor, "metallicRoughnessTexture": {"index": 0}}
+        primitive = triangle.primitive if factor == 0.25 else triangle.add_primitive()
+        primitive["material"] = triangle.add("materials", {"pbrMetallicRoughness": surface})
+    scene = read_scene(triangle.write())
+    assert scene.textures == ()
+    assert [float(each.base_color[0]) for each in scene.materials] == [0.75, 0.5]
+    said, metals = scene.warnings
+    assert said.startswith(f"2 metallic textures count as white; for one, {cause}")
+    assert metals.startswith("2 materials are metallic")
+
+
 def test_like_warnings_are_counted(triangle):
-    triangle.add_primitive()["material"] = triangle.add("materials", {"emissiveFactor": [1, 1, 1]})
-    triangle.primitive["material"] = triangle.add("materials", {"emissiveFactor": [1, 1, 1]})
+    metal = {"pbrMetallicRoughness": {}}
+    triangle.add_primitive()["material"] = triangle.add("materials", metal)
+    triangle.primitive["material"] = triangle.add("materials", metal)
     assert read_scene(triangle.write()).warnings == (
-        "2 materials emit light; emission does not light the scene yet",
+        "2 materials are metallic; their diffuse parts are drawn, their reflections are not",
     )
 
 

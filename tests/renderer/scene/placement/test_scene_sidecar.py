@@ -44,7 +44,8 @@ def test_the_sidecar_lies_beside_the_scene(tmp_path):
 
 
 def test_camera_and_spot(tmp_path):
-    camera, lights = read_sidecar(written(tmp_path, CAMERA + SPOT))
+    sidecar = read_sidecar(written(tmp_path, CAMERA + SPOT))
+    camera, lights = sidecar.camera, sidecar.lights
     assert camera.position_world.tolist() == [3.6, 2.7, -1.7]
     ahead = np.array([-2, 1.7, 0.9]) - np.array([3.6, 2.7, -1.7])
     assert -camera.to_world[:3, 2] == pytest.approx(ahead / np.linalg.norm(ahead))
@@ -59,7 +60,8 @@ def test_camera_and_spot(tmp_path):
 def test_point_and_directional(tmp_path):
     text = '[[light]]\ntype = "point"\nposition = [1, 2, 3]\nintensity = [1, 2, 3]\n'
     text += '[[light]]\ntype = "directional"\ndirection = [0, -3, 0]\nintensity = 5.5\n'
-    camera, (point, sun) = read_sidecar(written(tmp_path, text))
+    sidecar = read_sidecar(written(tmp_path, text))
+    camera, (point, sun) = sidecar.camera, sidecar.lights
     assert camera is None
     assert point.position_world.tolist() == [1, 2, 3] and point.intensity.tolist() == [1, 2, 3]
     assert sun.direction_world.tolist() == [0, -1, 0] and sun.intensity.tolist() == [5.5] * 3
@@ -94,6 +96,16 @@ def test_point_and_directional(tmp_path):
         (SPOT + "direction = [0, -1, 0]\n", "must have either 'direction' or 'look_at', got both"),
         (SPOT.replace("[0.0, 0.0, 2.0]", "[0.0, 2.0, 0.0]"), "direction must not be zero"),
         (SPOT.replace("spot", "point"), "unknown key 'look_at'"),
+        ("[sky]\n", r"\[sky\]: must have either 'radiance' or 'environment'"),
+        ('[sky]\nradiance = 1\nenvironment = "a.exr"\n', "must have either 'radiance' or 'environment'"),
+        ("[sky]\nradiance = 1\nscale = 2\n", "unknown key 'scale'"),
+        ("[sky]\nradiance = [1, -1, 1]\n", "'radiance' must not be negative"),
+        ("[sky]\nradiance = nan\n", "'radiance' must be 1 or 3 finite numbers"),
+        ("[sky]\nradiance = 1e30\n", r"'radiance' .*at most 1e\+18 each"),
+        ('[sky]\nenvironment = "a.png"\n', r"must be a file that ends in \.exr or \.hdr, got 'a\.png'"),
+        ("[sky]\nenvironment = 3\n", r"must be a file that ends in \.exr or \.hdr, got 3"),
+        ('[sky]\nenvironment = "a.exr"\nscale = -1\n', "'scale' must not be negative"),
+        ('[sky]\nenvironment = "a.exr"\nturn = 1\n', "unknown key 'turn'"),
     ],
 )
 def test_what_cannot_be_used_is_refused_by_name(tmp_path, text, message):
@@ -113,7 +125,7 @@ def test_a_sidecar_that_is_not_text_is_refused(tmp_path):
 def test_a_byte_order_mark_is_passed_over(tmp_path):
     path = tmp_path / "room.vpltune.toml"
     path.write_text("\ufeff" + CAMERA, encoding="utf-8")
-    assert read_sidecar(path)[0] is not None
+    assert read_sidecar(path).camera is not None
 
 
 def test_flags_go_before_sidecar_before_file_before_automatic(tmp_path):
@@ -233,12 +245,13 @@ def test_a_folder_that_changed_is_listed_again(tmp_path):
 
 
 def test_what_is_written_reads_back(tmp_path):
-    camera, lights = read_sidecar(
+    sidecar = read_sidecar(
         written(tmp_path, CAMERA + SPOT + '[[light]]\ntype = "point"\nposition = [1, 2, 3]\nintensity = 4\n')
     )
+    camera, lights = sidecar.camera, sidecar.lights
     path = tmp_path / "again.vpltune.toml"
     path.write_text(sidecar_text(camera, lights), encoding="utf-8")
-    again, lights_again = read_sidecar(path)
+    again, lights_again = read_sidecar(path).camera, read_sidecar(path).lights
     # Seven digits of the eye and the target, which stand a few units apart.
     np.testing.assert_allclose(again.to_world, camera.to_world, atol=1e-5)
     assert again.yfov == pytest.approx(camera.yfov, rel=1e-6)

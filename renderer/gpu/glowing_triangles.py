@@ -1,0 +1,124 @@
+"""The triangles of glowing surfaces, for light to be drawn from them."""
+
+import moderngl
+import numpy as np
+from jaxtyping import Float64, Int64
+
+from vpltune.renderer.files.srgb import linear_from_srgb
+from vpltune.renderer.gpu.gpu_context import check_errors
+from vpltune.renderer.gpu.resources import Resources
+from vpltune.renderer.gpu.rigid_pieces import RigidPiece, rigid_pieces
+from vpltune.renderer.gpu.scene_buffers import SceneBuffers
+from vpltune.renderer.scene.scene import Material, Scene
+
+GLOWING_READS = ("glowing_triangles", "glowing_places")
+"""What a program declares that includes `common/glowing_triangles.glsl`."""
+MOST_PIECES = 16
+"""A glowing triangle with a texture is cut into the square of this many, each with its mean radiance. A
+choice."""
+MOST_TRIANGLES = 1 << 18
+"""Triangles after cutting; with more, they are cut into fewer. A choice: 16 MiB."""
+
+_TRIANGLE_DTYPE = np.dtype([(corner, "f4", 4) for corner in "abc"] + [("place", "i4"), ("sides", "i4", 3)])
+
+
+class GlowingTriangles:
+    """The buffers behind `shaders/common/glowing_triangles.glsl`. Takes 64 bytes for each triangle.
+
+    A skinned mesh glows as rigid pieces, as rays meet it (`renderer.gpu.rigid_pieces`).
+
+    Raises:
+        MachineError: the GPU ran out of memory.
+    """
+
+    count: int
+    """Triangles, each placed instance's own."""
+
+    def __init__(self, context: moderngl.Context, scene: Scene, scene_buffers: SceneBuffers):
+        self._scene_buffers = scene_buffers
+        pieces = [
+            piece for piece in rigid_pieces(scene) if scene.materials[scene.meshes[piece.mesh].material].glows
+        ]
+        whole = sum(len(piece.triangles) for piece in pieces)
+        cuts = int(np.clip(np.sqrt(MOST_TRIANGLES / max(1, whole)), 1, MOST_PIECES))
+        parts = [_records(scene, piece, place, cuts) for place, piece in enumerate(pieces)]
+        records = np.concatenate([np.zeros(0, _TRIANGLE_DTYPE), *parts])
+        self.count = len(records)
+        self._rows = np.array([piece.matrix_row for piece in pieces], np.int64)
+        self._triangles = context.buffer(records if self.count else np.zeros(1, _TRIANGLE_DTYPE))
+        self._places = context.buffer(reserve=48 * max(1, len(pieces)))
+        self._placed: np.ndarray | None = None
+        check_errors(context, f"the glowing surfaces of scene {scene.name}")
+
+    def update(self) -> None:
+        """Follow the scene buffers' pose: one write if anything has moved, else none."""
+        buffers = self._scene_buffers
+        to_world = np.concatenate([buffers.transforms, buffers.joint_matrices])[self._rows]
+        if len(to_world) and (self._placed is None or not np.array_equal(to_world, self._placed)):
+            self._placed = to_world
+            self._places.write(np.ascontiguousarray(to_world[:, :3], np.float32))
+
+    def add_to(self, resources: Resources) -> None:
+        """Make these the triangles that programs with `GLOWING_READS` see."""
+        resources["glowing_triangles"] = self._triangles
+        resources["glowing_places"] = self._places
+
+
+def _records(scene: Scene, piece: RigidPiece, place: int, cuts: int) -> np.ndarray:
+    mesh = scene.meshes[piece.mesh]
+    material = scene.materials[mesh.material]
+    corners = piece.corners.astype(np.float64)
+    uv = mesh.uv[mesh.triangles[piece.triangles]].astype(np.float64)
+    if material.emission_texture is not None and cuts > 1:
+        weights = _cut(cuts)
+        corners = np.einsum("kvw,twa->tkva", weights, corners).reshape(-1, 3, 3)
+        uv = np.einsum("kvw,twa->tkva", weights, uv).reshape(-1, 3, 2)
+    radiance = _radiance(scene, material, uv)
+    records = np.zeros(len(corners), _TRIANGLE_DTYPE)
+    for corner, name in enumerate("abc"):
+        records[name][:, :3] = corners[:, corner]
+        records[name][:, 3] = radiance[:, corner]
+    records["place"] = place
+    records["sides"][:, 0] = 2 if material.emits_both_ways else 1
+    return records[radiance.any(axis=1)]
+
+
+def _radiance(
+    scene: Scene, material: Material, uv: Float64[np.ndarray, "triangles 3 2"]
+) -> Float64[np.ndarray, "triangles 3"]:
+    """The mean radiance of each triangle: that of a few places of its texture, without filtering."""
+    emission = np.array(material.emission)
+    if material.emission_texture is None:
+        return np.broadcast_to(emission, (len(uv), 3))
+    texture = scene.textures[material.emission_texture]
+    height, width, _ = texture.texels_srgb.shape
+    # The middles of the pieces that the triangle would be cut into.
+    middles = _cut(4).mean(axis=1)
+    places = np.einsum("kw,twa->tka", middles, uv)
+    columns, rows = (
+        _texel(places[..., 0], width, texture.wrap_u),
+        _texel(places[..., 1], height, texture.wrap_v),
+    )
+    return emission * linear_from_srgb(texture.texels_srgb[rows, columns] / 255.0).mean(axis=1)
+
+
+def _texel(coordinate: Float64[np.ndarray, "*shape"], size: int, wrap: str) -> Int64[np.ndarray, "*shape"]:
+    coordinate = np.nan_to_num(coordinate)
+    if wrap == "repeat":
+        coordinate = coordinate % 1.0
+    elif wrap == "mirrored_repeat":
+        coordinate = 1.0 - np.abs(coordinate % 2.0 - 1.0)
+    return np.clip((coordinate * size).astype(np.int64), 0, size - 1)
+
+
+def _cut(count: int) -> Float64[np.ndarray, "pieces 3 3"]:
+    """Barycentric coordinates of the corners of count² equal pieces of a triangle, which keep its winding."""
+    pieces = []
+    for row in range(count):
+        for column in range(count - row):
+            low, right, up = (column, row), (column + 1, row), (column, row + 1)
+            pieces.append([low, right, up])
+            if column + row + 2 <= count:
+                pieces.append([right, (column + 1, row + 1), up])
+    place = np.array(pieces, np.float64) / count
+    return np.concatenate([1.0 - place.sum(axis=2, keepdims=True), place], axis=2)

@@ -8,10 +8,10 @@ layout(local_size_x = 8, local_size_y = 8) in;
 uniform sampler2D gbuffer_albedo;
 uniform sampler2D direct_irradiance;
 uniform sampler2D indirect_irradiance;
-#if GLOWS
+#ifdef GLOWS
 uniform sampler2D gbuffer_emission;
 #endif
-#if SHOWS_SKY
+#ifdef SHOWS_SKY
 uniform sampler2D environment_map;  // equirectangular, row 0 up (renderer/scene/environment.py)
 uniform mat4 camera_to_world;
 uniform vec2 tan_half_fov;
@@ -22,7 +22,7 @@ layout(rgba32f, binding = RADIANCE_IMAGE) writeonly uniform image2D out_radiance
 
 const float PI = 3.14159265358979;
 
-#if SHOWS_SKY
+#ifdef SHOWS_SKY
 // Radiance of the environment [W/(m² sr)] behind a pixel.
 vec3 sky_radiance(ivec2 pixel) {
     vec2 ndc = (vec2(pixel) + 0.5) / vec2(imageSize(out_radiance)) * 2.0 - 1.0;
@@ -42,10 +42,10 @@ void main() {
     vec3 irradiance = share.x * texelFetch(direct_irradiance, pixel, 0).rgb
                     + share.y * texelFetch(indirect_irradiance, pixel, 0).rgb;
     vec3 radiance = albedo.rgb / PI * irradiance;
-#if GLOWS
+#ifdef GLOWS
     radiance += share.x * texelFetch(gbuffer_emission, pixel, 0).rgb;
 #endif
-#if SHOWS_SKY
+#ifdef SHOWS_SKY
     if (!(albedo.a > 0.0)) {
         radiance = share.x * sky_radiance(pixel);
     }

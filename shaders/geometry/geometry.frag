@@ -1,7 +1,7 @@
 // Geometry pass: writes the G-buffer's shading normal (octahedral) and albedo, and in scenes with glowing surfaces the
 // emitted radiance. Positions are rebuilt from depth.
 //
-// Reads: the outputs of geometry.vert, the base colour and emission textures. Constants: GLOWS, 0 or 1. Python: renderer/frame/passes/geometry.py.
+// Reads: the outputs of geometry.vert, the base colour and emission textures. Constants: GLOWS, if surfaces emit. Python: renderer/frame/passes/geometry.py.
 #include "common/octahedral.glsl"
 #include "common/surface.glsl"
 #ifdef HAS_ALPHA
@@ -12,7 +12,7 @@ uniform vec3 eye_world;
 
 layout(location = 0) out vec2 out_normal;
 layout(location = 1) out vec4 out_albedo;
-#if GLOWS
+#ifdef GLOWS
 layout(location = 2) out vec4 out_emission;
 
 uniform sampler2D emission_texture;
@@ -37,7 +37,7 @@ void main() {
     vec3 to_eye = eye_world - position_world;
     out_normal = octahedral_encode(shading_normal(to_eye, geometric_normal(to_eye)));
     out_albedo = vec4(surface_albedo(), 1.0);
-#if GLOWS
+#ifdef GLOWS
     out_emission = vec4(surface_emission(), 1.0);
 #endif
 }

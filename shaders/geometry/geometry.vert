@@ -15,7 +15,7 @@ out vec3 base_color;
 #ifdef HAS_ALPHA
 flat out vec4 alpha;
 #endif
-#if GLOWS
+#ifdef GLOWS
 flat out vec4 emission;  // radiance [W/(m² sr)]; 1 if both sides emit
 #endif
 
@@ -28,7 +28,7 @@ void main() {
 #ifdef HAS_ALPHA
     alpha = scene_instances[in_instance].alpha;
 #endif
-#if GLOWS
+#ifdef GLOWS
     emission = scene_instances[in_instance].emission;
 #endif
     vec3 position_camera = (world_to_camera * vec4(position_world, 1.0)).xyz;

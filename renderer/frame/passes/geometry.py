@@ -22,7 +22,7 @@ class GeometryPass(FramePass):
             scene,
             "geometry/geometry",
             ("emission_texture",) if scene.glows else (),
-            {"GLOWS": scene.glows},
+            {"GLOWS": 1} if scene.glows else {},
         )
 
     def draw(self, inputs: FrameInputs) -> None:

@@ -16,7 +16,7 @@ class MaterialResolvePass:
         self._program = ComputeProgram(
             resources,
             "display/material_resolve",
-            {"GLOWS": glows, "SHOWS_SKY": shows_sky},
+            {**({"GLOWS": 1} if glows else {}), **({"SHOWS_SKY": 1} if shows_sky else {})},
             reads=(
                 "gbuffer_albedo",
                 "direct_irradiance",

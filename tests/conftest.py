@@ -59,6 +59,14 @@ def gl_context():
     return create_context()
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_fixture_setup(fixturedef, request):
+    """Fixtures of a module are made before those of a test, and what they compile belongs to the context that is
+    current then: `gl_context`, where they ask for it."""
+    if "gl_context" in fixturedef.argnames:
+        request.getfixturevalue("gl_context").__enter__()
+
+
 @pytest.fixture(autouse=True)
 def gl_context_is_current(request):
     """Whatever context an earlier test made for itself, `gl_context` is the one that OpenGL calls reach."""

@@ -61,8 +61,8 @@ def gl_context():
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_fixture_setup(fixturedef, request):
-    """Fixtures of a module are made before those of a test, and what they compile belongs to the context that is
-    current then: `gl_context`, where they ask for it."""
+    """Fixtures of a module are made before those of a test, and what they compile belongs to the context that
+    is current then: `gl_context`, where they ask for it."""
     if "gl_context" in fixturedef.argnames:
         request.getfixturevalue("gl_context").__enter__()
 

@@ -158,6 +158,8 @@ class ReferenceRequest:
     view: View
     seconds: float | None
     follows: tuple[int | None, ...]
+    bounces: int | None
+    """Of the config whose error is shown; None for all."""
 
 
 @dataclass(frozen=True, eq=False)

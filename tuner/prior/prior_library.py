@@ -120,7 +120,9 @@ def prior_views(scene: Scene) -> tuple[View, ...]:
 
 def prior_references(scene: Scene, views: tuple[View, ...]) -> tuple[ReferenceView, ...]:
     """The references of these views, cached like any others."""
-    return reference_views(scene, views, noise_target=NOISE_TARGET, max_samples=MAX_SAMPLES)
+    return reference_views(
+        scene, views, noise_target=NOISE_TARGET, max_samples=MAX_SAMPLES, bounces=CONFIG.light.most_bounces
+    )
 
 
 def _captured(
@@ -165,6 +167,7 @@ def _key(scene: Scene, views: tuple[View, ...]) -> str:
         "runtime": [
             asdict(DEFAULT_OPTIONS),
             CONFIG.quality.as_dict(),
+            CONFIG.light.as_dict(),
             VisibilityMapLayout.of(CONFIG).defines,
         ],
         "axes": [[spec.low, spec.high, spec.scale] for spec in axes],

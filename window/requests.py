@@ -159,7 +159,7 @@ class ReferenceRequest:
     seconds: float | None
     follows: tuple[int | None, ...]
     bounces: int | None
-    """Of the config whose error is shown; None for all."""
+    """As the config has it whose error is shown; None for all."""
 
 
 @dataclass(frozen=True, eq=False)

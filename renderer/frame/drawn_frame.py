@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import moderngl
 import numpy as np
@@ -18,6 +18,7 @@ from vpltune.renderer.gpu.gpu_context import check_errors
 from vpltune.renderer.scene.views import View
 
 
+@runtime_checkable
 class HasContext(Protocol):
     """What lives on an OpenGL context."""
 

@@ -87,7 +87,8 @@ def _radiance(
     scene: Scene, material: Material, uv: Float64[np.ndarray, "triangles 3 2"]
 ) -> Float64[np.ndarray, "triangles 3"]:
     """The mean radiance of each triangle: that of a few places of its texture, without filtering."""
-    emission = np.array(material.emission)
+    # A blended surface emits by the share of the light that it stops.
+    emission = np.array(material.emission) * (material.opacity if material.is_blended else 1.0)
     if material.emission_texture is None:
         return np.broadcast_to(emission, (len(uv), 3))
     texture = scene.textures[material.emission_texture]

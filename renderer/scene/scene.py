@@ -66,7 +66,8 @@ class Material:
     emission_texture: int | None = None
     """Index into `Scene.textures` of a factor of the emission. Its opacity is ignored."""
     emits_both_ways: bool = False
-    """Whether the back emits too. The front is where the triangles wind counter-clockwise."""
+    """Whether the back emits too. The front is the side from where triangles run counter-clockwise as they
+    stand in the world; a reader turns meshes that a mirrored node would turn round."""
 
     @property
     def is_opaque(self) -> bool:

@@ -28,7 +28,7 @@ struct GlowingTriangle {
     vec3 a;
     vec3 to_b;
     vec3 to_c;
-    vec3 normal;    // unit, on the side that emits
+    vec3 normal;    // unit, on the side from where the corners run counter-clockwise: that side emits
     float area;     // of one side [world units²]
     vec3 radiance;  // [W/(m² sr)]
     float sides;
@@ -42,10 +42,9 @@ GlowingTriangle glowing_triangle(int index) {
     vec3 to_c = vec4(stored.c, 1.0) * place - a;
     vec3 across = cross(to_b, to_c);
     float twice_area = length(across);
-    // A mirrored surface keeps its front: glTF 2.0, section 3.7.4. 1e-30 keeps the quotient finite.
-    float mirrored = dot(vec3(place[0]), cross(vec3(place[1]), vec3(place[2]))) < 0.0 ? -1.0 : 1.0;
+    // 1e-30 keeps the quotient finite.
     return GlowingTriangle(
-        a, to_b, to_c, across * (mirrored / max(twice_area, 1e-30)), 0.5 * twice_area,
+        a, to_b, to_c, across / max(twice_area, 1e-30), 0.5 * twice_area,
         vec3(stored.red, stored.green, stored.blue), float(stored.sides));
 }
 

@@ -18,15 +18,13 @@ layout(location = 2) out vec4 out_emission;
 uniform sampler2D emission_texture;
 uniform ivec2 emission_mirrored;
 flat in vec4 emission;
-flat in int is_mirrored;
 
 // Emitted radiance [W/(m² sr)] towards the eye.
 vec3 surface_emission() {
-    bool is_front = gl_FrontFacing == (is_mirrored == 0);
     vec2 folded = 1.0 - abs(mod(uv, 2.0) - 1.0);
     vec2 place = mix(uv, folded, vec2(emission_mirrored));
     vec3 texel = textureGrad(emission_texture, place, dFdx(uv), dFdy(uv)).rgb;
-    return is_front || emission.w > 0.0 ? emission.rgb * texel : vec3(0.0);
+    return gl_FrontFacing || emission.w > 0.0 ? emission.rgb * texel : vec3(0.0);
 }
 #endif
 

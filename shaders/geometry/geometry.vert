@@ -16,8 +16,7 @@ out vec3 base_color;
 flat out vec4 alpha;
 #endif
 #if GLOWS
-flat out vec4 emission;   // radiance [W/(m² sr)]; 1 if both sides emit
-flat out int is_mirrored; // 1 if the surface's winding is turned round
+flat out vec4 emission;  // radiance [W/(m² sr)]; 1 if both sides emit
 #endif
 
 void main() {
@@ -31,8 +30,6 @@ void main() {
 #endif
 #if GLOWS
     emission = scene_instances[in_instance].emission;
-    bool is_skinned = scene_instances[in_instance].skinning.z > 0;
-    is_mirrored = int(!is_skinned && determinant(near_one(mat3(scene_instances[in_instance].to_world))) < 0.0);
 #endif
     vec3 position_camera = (world_to_camera * vec4(position_world, 1.0)).xyz;
     // Reversed depth without a far plane: depth = near_plane / distance along the view axis.

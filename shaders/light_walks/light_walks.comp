@@ -4,11 +4,12 @@
 // Reads: starts (samples drawn from the RSM, and from glowing surfaces), directions, ray hierarchy.
 // Writes: samples, [walks, steps], dark ones where a walk has left the scene. One invocation for each walk.
 // Constants: WALK_LAMPS and WALK_GLOWING (1 if there are such starts), GLOWING_SAMPLES, WALK_STEPS, WALK_ENDS (1 if the
-// last step stands for all that would follow).
+// last step stands for all that would follow), WALK_SURVIVAL, WALK_MOST_RAYS.
 // Python: renderer/frame/passes/light_walks.py.
 //
 // A walk leaves a surface with the density cosθ/π, so each ray carries the same part of the flux (Keller 1997). All of it
-// is kept, and the albedo of the surface met multiplies it: no walk ends by chance, and the flux has no noise of its own.
+// is kept, and the albedo of the surface met multiplies it: no walk ends by chance before its last step, and the flux has
+// no noise of its own.
 // The samples of step s are the light of s + 1 reflections, or of s + 2 if the walk began in an RSM, where the light had
 // been reflected once.
 // First: common/ray_alpha.glsl includes it only where there are holes.
@@ -45,8 +46,6 @@ uniform vec2 table_rotation;   // as in virtual_point_lights.comp
 const float PI = 3.14159265358979;
 // A choice: a ray starts so far above its surface, in diagonals of the scene. 7 digits of float32 leave 60 times less.
 const float WALK_LIFT = 1e-5;
-// A choice: the largest share of light that a surface returns at the end of a walk. It bounds the sum where nothing absorbs.
-const float MOST_RETURNED = 0.98;
 
 // A direction about a normal with the density cosθ/π (Malley's method: a point of the disc, lifted to the hemisphere).
 vec3 cosine_direction(vec3 normal, vec2 point) {
@@ -85,6 +84,64 @@ VirtualPointLight walk_start(int walk, out int steps) {
     return start;
 }
 
+// Two numbers in [0, 1) for a walk's ray after its first.
+vec2 walk_numbers(uint seed, int ray) {
+    return vec2(unit_number(hashed(seed ^ uint(2 * ray))), unit_number(hashed(seed ^ uint(2 * ray + 1))));
+}
+
+// Where a walk meets a surface next, and what that reflects; NO_VPL where it leaves the scene.
+VirtualPointLight next_reflection(VirtualPointLight place, vec2 numbers, uint seed) {
+    vec3 normal = place.normal_area.xyz;
+    vec3 origin = place.position_footprint.xyz + normal * (WALK_LIFT * longest);
+    vec3 direction = cosine_direction(normal, numbers);
+#ifdef RAYS_MEET_HOLES
+    ray_seed = seed;
+#endif
+    RayHit hit = ray_hit(origin, direction, longest);
+    if (hit.triangle == RAY_NO_TRIANGLE) {
+        return NO_VPL;
+    }
+    return VirtualPointLight(
+        vec4(origin + direction * hit.distance, 1.0), vec4(ray_hit_normal(hit, direction), 1.0),
+        vec4(place.flux.rgb * ray_hit_albedo(hit), 0.0));
+}
+
+float mean_flux(VirtualPointLight one) {
+    return (one.flux.r + one.flux.g + one.flux.b) / 3.0;
+}
+
+#if WALK_ENDS
+// One of all reflections from `first` on, drawn by its flux (Chao 1982), with the flux of all of them. From there on a
+// walk ends by Russian roulette, as its light may be caught in a corner that absorbs little.
+VirtualPointLight one_of_the_rest(VirtualPointLight first, int ray, uint seed) {
+    VirtualPointLight place = first;
+    VirtualPointLight drawn = first;
+    float total = mean_flux(first);
+    for (int i = 0; i < WALK_MOST_RAYS; ++i) {
+        vec2 chances = walk_numbers(seed, 2 * (ray + i) + 1);
+        VirtualPointLight next = next_reflection(place, walk_numbers(seed, 2 * (ray + i)), seed + uint(ray + i));
+        float most = max(max(next.flux.r, next.flux.g), next.flux.b);
+        float before = max(max(place.flux.r, place.flux.g), place.flux.b);
+        if (!(most > 0.0)) {
+            break;
+        }
+        float flux = mean_flux(next);
+        total += flux;
+        if (chances.x * total < flux) {
+            drawn = next;
+        }
+        float survival = min(most / before, WALK_SURVIVAL);
+        if (chances.y >= survival) {
+            break;
+        }
+        place = next;
+        place.flux.rgb /= survival;
+    }
+    drawn.flux.rgb *= total / max(mean_flux(drawn), 1e-30);
+    return drawn;
+}
+#endif
+
 void main() {
     int walk = int(gl_GlobalInvocationID.x);
     if (walk >= walk_count) {
@@ -92,35 +149,19 @@ void main() {
     }
     int steps;
     VirtualPointLight place = walk_start(walk, steps);
-    vec2 numbers = fract(walk_directions[walk] + table_rotation);
     uint seed = hashed(uint(walk));
     for (int i = 0; i < WALK_STEPS; ++i) {
         VirtualPointLight reflected = NO_VPL;
         if (i < steps && any(greaterThan(place.flux.rgb, vec3(0.0)))) {
-            vec3 normal = place.normal_area.xyz;
-            vec3 direction = cosine_direction(normal, numbers);
-#ifdef RAYS_MEET_HOLES
-            ray_seed = seed + uint(i);
-#endif
-            RayHit hit = ray_hit(place.position_footprint.xyz + normal * (WALK_LIFT * longest), direction, longest);
-            if (hit.triangle != RAY_NO_TRIANGLE) {
-                vec3 albedo = ray_hit_albedo(hit);
-                vec3 position = place.position_footprint.xyz + normal * (WALK_LIFT * longest) + direction * hit.distance;
-                reflected = VirtualPointLight(
-                    vec4(position, 1.0), vec4(ray_hit_normal(hit, direction), 1.0), vec4(place.flux.rgb * albedo, 0.0));
-                place = reflected;
+            vec2 numbers = i == 0 ? fract(walk_directions[walk] + table_rotation) : walk_numbers(seed, 2 * i);
+            reflected = next_reflection(place, numbers, seed + uint(i));
+        }
+        place = reflected;
 #if WALK_ENDS
-                // What would follow is taken to be reflected here, over and over.
-                if (i == steps - 1) {
-                    reflected.flux.rgb /= 1.0 - min(albedo, vec3(MOST_RETURNED));
-                }
+        if (i == steps - 1 && mean_flux(reflected) > 0.0) {
+            reflected = one_of_the_rest(reflected, steps, seed);
+        }
 #endif
-            }
-        }
-        if (reflected.normal_area.w == 0.0) {
-            place.flux = vec4(0.0);
-        }
         later_samples[walk * WALK_STEPS + i] = reflected;
-        numbers = vec2(unit_number(hashed(seed ^ uint(2 * i + 2))), unit_number(hashed(seed ^ uint(2 * i + 3))));
     }
 }

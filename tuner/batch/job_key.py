@@ -92,7 +92,7 @@ def _settings(options: JobOptions) -> str:
     settings["light"] = start.light.as_dict()
     if options.environment is not None:
         # What is in the file counts, not where it lies.
-        settings["environment"] = _file_digest(Path(options.environment))
+        settings["environment"] = {"sha256": _file_digest(Path(options.environment))}
     if start.auto is not None:
         settings["auto"] = start.auto.as_dict()
     versions = {name: importlib.metadata.version(name) for name in ("vpltune", "jax", "mitsuba")}

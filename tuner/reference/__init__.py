@@ -1,4 +1,4 @@
-"""Ground truth for a fit: one bounce of indirect light, path-traced with Mitsuba."""
+"""Ground truth for a fit: direct light and its bounces, path-traced with Mitsuba."""
 
 from typing import TYPE_CHECKING
 

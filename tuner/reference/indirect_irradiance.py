@@ -28,7 +28,7 @@ from jaxtyping import Bool, Float32, Float64, UInt32
 from vpltune.renderer.scene.views import View, ray_directions_world
 from vpltune.tuner.reference.directions import cosine_direction
 from vpltune.tuner.reference.punctual_lights import PunctualLights
-from vpltune.tuner.reference.sobol import hashed, owen_scrambled, reversed_sobol_points
+from vpltune.tuner.reference.sobol import hashed, hashed_twice, owen_scrambled, reversed_sobol_points
 from vpltune.tuner.reference.surfaces import Surface, cosine_density
 from vpltune.tuner.reference.traced_scene import TracedScene
 from vpltune.tuner.reference.unit_triangles import UnitTriangles
@@ -176,11 +176,13 @@ class IndirectIrradiance:
         """
         w = self._wavefront
         per_vertex = len(first_numbers) + _OTHER_NUMBERS
+        # Scenes in which nothing glows keep the numbers that their cached references were made with.
+        hashing = hashed if self._emitted is None else hashed_twice
 
         def bounce(depth, alive, vertex, numbers, throughput, arriving):
             x = Surface(*vertex)
             chosen, survives, *following = (
-                hashed(w, stream + depth * per_vertex + k, seed) for k in range(per_vertex)
+                hashing(w, stream + depth * per_vertex + k, seed) for k in range(per_vertex)
             )
             # Light that x reflects is counted up to the limit; what glows also shines on the last vertex.
             reflects = alive if self._emitted is None else alive & (depth < limit)

@@ -35,10 +35,23 @@ def hashed(wavefront, counter, seed):
 
     Twin: shaders/common/hash.glsl.
     """
-    x = counter ^ seed
+    return _unit_interval(wavefront, _mixed(counter ^ seed))
+
+
+def hashed_twice(wavefront, counter, seed):
+    """As `hashed`, for neighbouring counters whose numbers are multiplied.
+
+    With `hashed`, Russian roulette and the directions after it are a little dependent: all bounces in a
+    furnace of reflectance 0.8 were 0.12 ± 0.02 % too bright.
+    """
+    # An odd constant, 2³²/φ (Knuth), since 0 is mapped to itself.
+    return _unit_interval(wavefront, _mixed(_mixed(counter ^ seed) + 0x9E3779B1))
+
+
+def _mixed(x):
     x = (x ^ x >> 16) * 0x21F0AAAD
     x = (x ^ x >> 15) * 0xD35A2D97
-    return _unit_interval(wavefront, x ^ x >> 15)
+    return x ^ x >> 15
 
 
 def _unit_interval(wavefront, bits):

@@ -171,24 +171,18 @@ def _alphas(scene: Scene, meshes: list[Mesh]) -> tuple[list[int], Float32[np.nda
 def _emissions(
     scene: Scene, placed: list[Instance]
 ) -> tuple[list[int], Float32[np.ndarray, "emissions 4"], UInt32[np.ndarray, " emissions"]]:
-    """The row of each instance, and the rows: one for all that is dark, then one for each material and side.
-
-    glTF 2.0, section 3.7.4: where a transform has a negative determinant, the front is where the transformed
-    triangles wind clockwise.
-    """
+    """The row of each instance, and the rows: one for all that is dark, then one for each lamp material."""
     row_of: list[int] = []
-    rows: dict[tuple[int, float], int] = {}
+    rows: dict[int, int] = {}
     emissions, textures = [(0.0, 0.0, 0.0, 0.0)], [0]
     for instance in placed:
         index = scene.meshes[instance.mesh].material
         material = scene.materials[index]
-        mirrored = np.linalg.det(instance.to_world[:3, :3]) < 0.0
-        side = 0.0 if material.emits_both_ways else -1.0 if mirrored else 1.0
-        if material.glows and (index, side) not in rows:
-            rows[index, side] = len(emissions)
-            emissions.append((*material.emission, side))
+        if material.glows and index not in rows:
+            rows[index] = len(emissions)
+            emissions.append((*material.emission, 0.0 if material.emits_both_ways else 1.0))
             textures.append(_texture_row(material.emission_texture))
-        row_of.append(rows.get((index, side), 0))
+        row_of.append(rows.get(index, 0))
     return row_of, np.array(emissions, np.float32), np.array(textures, np.uint32)
 
 

@@ -14,8 +14,12 @@ WALKS = 4096
 """Walks of a frame. A choice of 2,048, 4,096 and 8,192: in eight generated rooms the mean relMSE is 0.016,
 0.011 and 0.013 (docs/design_decisions.md, All the light)."""
 STEPS_OF_ALL = 8
-"""Reflections that a walk records where it stands for all of them; the last stands for the rest. A choice: at
-an albedo of 0.5, one part in 256 is left for it."""
+"""Reflections that a walk records where it stands for all of them. The last is one of all that would follow,
+with the flux of them all. A choice: at an albedo of 0.5, one part in 128 is left for it."""
+SURVIVAL = 0.95
+"""Largest chance that a walk goes on after its last step, else the albedo. A choice, as of the reference."""
+MOST_RAYS = 64
+"""Rays of a walk after its last step. A choice, as of the reference."""
 SPREAD = 2.0
 """Radius of the disc that one of n samples stands for, in L/√n: n of them cover 4π L², about the surface of
 what L is measured of. Only discs made of a single sample depend on it. A choice."""
@@ -83,6 +87,8 @@ class LightWalksPass(FramePass):
                 **hierarchy.defines,
                 **defines,
                 "FRAME_TURNS_OVER": FRAME_TURNS_OVER,
+                "WALK_SURVIVAL": SURVIVAL,
+                "WALK_MOST_RAYS": MOST_RAYS,
                 "GLOWING_SAMPLES": glowing.sample_count if glowing else 0,
             },
             reads=(*hierarchy.reads, "walk_directions", *starts),

@@ -140,11 +140,18 @@ def mitsuba():
     return mitsuba
 
 
-def plain_path_trace(mi, scene: Scene, view: View, depth: int, samples: int, seed: int):
-    """Radiance at the pixel centres by Mitsuba's integrator: mean, and variance of the mean, [h, w, 3]."""
+def plain_path_trace(mi, scene: Scene, view: View, depth: int, samples: int, seed: int, sky=None):
+    """Radiance at the pixel centres by Mitsuba's integrator: mean, and variance of the mean, [h, w, 3].
+
+    `sky` maps unit vectors, [..., 3], to the radiance from there: Mitsuba's own maps are bilinear, with
+    texels on the poles, so ours cannot be handed over as they are.
+    """
     import drjit as dr
 
-    stock = mi.load_dict(_stock_scene(mi, scene, view.lights))
+    stock = _stock_scene(mi, scene, view.lights)
+    if sky is not None:
+        stock["sky"] = _stock_sky(mi, sky)
+    stock = mi.load_dict(stock)
     integrator = mi.load_dict({"type": "path", "max_depth": depth, "rr_depth": 1000})
     width, height = view.size
     directions = ray_directions_world(view).reshape(-1, 3)
@@ -190,6 +197,10 @@ def _stock_mesh(mi, scene: Scene, instance: Instance):
     properties["bsdf"] = mi.load_dict(
         {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": reflectance}}
     )
+    if material.glows:
+        assert material.emission_texture is None and not material.emits_both_ways
+        radiance = {"type": "rgb", "value": list(material.emission)}
+        properties["emitter"] = mi.load_dict({"type": "area", "radiance": radiance})
     stock = mi.Mesh(
         mesh.name,
         len(mesh.positions),
@@ -210,6 +221,22 @@ def _stock_mesh(mi, scene: Scene, instance: Instance):
     parameters["faces"] = mi.UInt32(mesh.triangles.ravel().astype(np.uint32))
     parameters.update()
     return stock
+
+
+def _stock_sky(mi, sky) -> dict:
+    """Rows from pole to pole, both included, and columns from azimuth 0, from −Z towards +X."""
+    height, width = 257, 512
+    polar = np.pi * np.arange(height)[:, None] / (height - 1)
+    azimuth = 2.0 * np.pi * np.arange(width) / width
+    directions = np.stack(
+        [
+            np.sin(polar) * np.sin(azimuth),
+            np.broadcast_to(np.cos(polar), (height, width)),
+            -np.sin(polar) * np.cos(azimuth),
+        ],
+        axis=-1,
+    )
+    return {"type": "envmap", "bitmap": mi.Bitmap(sky(directions).astype(np.float32))}
 
 
 def _stock_emitter(mi, light: Light) -> dict:

@@ -7,6 +7,7 @@ import pytest
 
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.environment import Environment, even_sky, solid_angles
+from vpltune.renderer.scene.files.surface import turned
 from vpltune.renderer.scene.scene import Light, Material, Texture, scaled
 from vpltune.renderer.scene.views import scaled_view
 from vpltune.tuner.reference import ReferenceView, noise_floor, reference_views
@@ -174,19 +175,21 @@ def test_a_panel_lights_the_floor_by_its_form_factor(shapes, corner, edge_u, edg
 
 
 def mirrored(scene):
-    """The panel reflected at x = 0, where it lies again, by a node of negative determinant."""
+    """The panel reflected at x = 0, where it lies again, by a node of negative determinant; and turned, as a
+    reader turns it, so that its front stays in front."""
     moved = replace(scene.instances[1], to_world=np.diag([-1.0, 1.0, 1.0, 1.0]))
-    return replace(scene, instances=(scene.instances[0], moved))
+    meshes = [turned(mesh) if i == moved.mesh else mesh for i, mesh in enumerate(scene.meshes)]
+    return replace(scene, meshes=tuple(meshes), instances=(scene.instances[0], moved))
 
 
 @pytest.mark.parametrize("reflect", [False, True])
 def test_the_front_alone_glows_unless_both_sides_do(shapes, reflect):
-    """A mirror changes no side: glTF turns the winding with the determinant."""
+    """The front is the side from where triangles run counter-clockwise in the world."""
     view = shapes.view_of((0.9, 0.6, 0.9), (0.1, 0, 0.05), [], (8, 8), 0.5)
     seen_from_below = shapes.view_of((0.1, 0.1, 0.1), (0.0, 1, 0), [], (4, 4), 0.2)
-    turned = {"corner": (-0.5, 1, -0.3), "edge_u": (0, 0, 0.6), "edge_v": (1, 0, 0)}
+    away_from_floor = {"corner": (-0.5, 1, -0.3), "edge_u": (0, 0, 0.6), "edge_v": (1, 0, 0)}
     levels = []
-    for both, away in ((False, {}), (True, {}), (True, turned), (False, turned)):
+    for both, away in ((False, {}), (True, {}), (True, away_from_floor), (False, away_from_floor)):
         scene = panel_scene(shapes, lamp(emits_both_ways=both), **away)
         scene = mirrored(scene) if reflect else scene
         got = reference(scene, view, max_samples=256)

@@ -14,6 +14,7 @@ from vpltune.renderer.errors import MachineError
 from vpltune.renderer.files import unfinished_files
 from vpltune.renderer.files.atomic_file import written_whole
 from vpltune.renderer.files.unfinished_files import PREFIX
+from vpltune.renderer.scene.environment import even_sky
 from vpltune.renderer.scene.scene import scaled
 from vpltune.renderer.scene.views import scaled_view
 from vpltune.tuner.reference import ReferenceView, cache, noise_floor, reference_views
@@ -108,6 +109,16 @@ def test_kept_references_are_found_without_mitsuba(shapes, monkeypatch, tmp_path
     made = reference_views(scene, (view,), **arguments)[0]
     monkeypatch.setattr("vpltune.tuner.reference.references._rendered", None)
     assert same(made, reference_views(scene, (view,), **arguments)[0])
+    # A glowing one keeps its emission too, and a dark one has none.
+    lit = replace(scene, environment=even_sky((1.0, 1.0, 1.0)))
+    monkeypatch.undo()
+    no_cache(monkeypatch, tmp_path)
+    bright = reference_views(lit, (view,), **arguments)[0]
+    monkeypatch.setattr("vpltune.tuner.reference.references._rendered", None)
+    kept = reference_views(lit, (view,), **arguments)[0]
+    assert same(bright, kept) and np.array_equal(bright.emission, kept.emission)
+    assert kept.direct_noise_floor == bright.direct_noise_floor > made.direct_noise_floor == 0.0
+    assert made.emission is None
     # Names do not enter the key.
     renamed = replace(scene, name="another name")
     assert same(made, reference_views(renamed, (replace(view, name="other"),), **arguments)[0])
@@ -131,6 +142,11 @@ def test_anything_that_matters_makes_another_reference(shapes, monkeypatch, tmp_
     moved[0, 0] = np.nextafter(moved[0, 0], np.float32(9.0))
     brighter = replace(view.lights[0], intensity=view.lights[0].intensity * 2.0)
     plain = {"seed": 0, "noise_target": 0.1, "max_samples": 4, "bounces": 1}
+    glow = replace(scene.materials[0], emission=(1.0, 0.0, 0.0))
+
+    def glowing(**changes):
+        return replace(scene, materials=(replace(glow, **changes), *scene.materials[1:]))
+
     variations = [
         (scene, view, {}),
         (replace(scene, meshes=(replace(mesh, positions=moved), *scene.meshes[1:])), view, {}),
@@ -142,6 +158,12 @@ def test_anything_that_matters_makes_another_reference(shapes, monkeypatch, tmp_
         (scene, view, {"noise_target": 0.2}),
         (scene, view, {"max_samples": 8}),
         (scene, view, {"bounces": None}),
+        (glowing(), view, {}),
+        (glowing(emission=(1.0, 0.0, 0.1)), view, {}),
+        (glowing(emission_texture=0), view, {}),
+        (glowing(emits_both_ways=True), view, {}),
+        (replace(scene, environment=even_sky((1.0, 1.0, 1.0))), view, {}),
+        (replace(scene, environment=even_sky((1.0, 1.0, 2.0))), view, {}),
     ]
     for _ in range(2):
         for changed_scene, changed_view, changes in variations:
@@ -216,9 +238,13 @@ def test_arguments_out_of_range_are_refused(shapes, bad):
         reference_views(shapes.box_room(), (shapes.box_room_view((8, 6)),), **bad)
 
 
-def test_scalar_fallback_agrees_within_noise(shapes, tmp_path):
+@pytest.mark.parametrize("glows", [False, True])
+def test_scalar_fallback_agrees_within_noise(shapes, tmp_path, glows):
     """Without LLVM, the same rays with the same randomisation are traced: results agree far below noise."""
     scene, view = shapes.box_room(), shapes.box_room_view((16, 12))
+    if glows:
+        materials = (replace(scene.materials[0], emission=(0.2, 0.1, 0.3)), *scene.materials[1:])
+        scene = replace(scene, materials=materials, environment=even_sky((0.3, 0.2, 0.1)))
     arguments = {"seed": 3, "noise_target": 0.0, "max_samples": 32, "bounces": 2}
     base = reference_views(scene, (view,), **arguments)[0]
     (tmp_path / "job").write_bytes(pickle.dumps((scene, view, arguments)))

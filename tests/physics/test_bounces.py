@@ -24,8 +24,8 @@ BOUNCES: tuple[Bounces, ...] = (1, 2, 3, "all")
 
 
 def config_of(bounces: Bounces, **changes) -> TunedConfig:
-    """512 discs from a small RSM, gathered in full. Nothing is in the way of anything in a convex box, so that
-    transmittance alone is right there."""
+    """512 discs from a small RSM, gathered in full. Nothing is in the way of anything in a convex box, so
+    that transmittance alone is right there."""
     config = TunedConfig(
         ArtistParameters(vpl_count=512),
         visibility="transmittance",
@@ -86,8 +86,9 @@ def test_a_furnace_gives_the_geometric_series(gl_context, albedo, bounces):
 
 @pytest.mark.parametrize("albedo", [0.3, 0.7])
 def test_bounces_in_a_box_fall_by_the_albedo(gl_context, albedo):
-    """A lamp in a closed box: all light that is reflected arrives, so that each bounce has ρ times the flux of
-    the one before; to 1 %, as some rays pass through the edges. If no light walked on, there would be none.
+    """A lamp in a closed box: all light that is reflected arrives, so that each bounce has ρ times the flux
+    of the one before; to 1 %, as some rays pass through the edges. If no light walked on, there would be
+    none.
 
     In the image too, but about: light is even only after some bounces, and the camera does not see all. To
     15 % of ρ.
@@ -113,7 +114,7 @@ def test_scale_changes_nothing(gl_context, factor):
     pass an edge on another side."""
     made = colored_room()
     lit = replace(made.materials[0], emission=(0.2, 0.3, 0.4))
-    scene, view = replace(made, materials=(lit, *made.materials[1:])), room_view("point", (48, 36))
+    scene, view = replace(made, materials=(lit, *made.materials[1:])), room_view("point", (32, 24))
     images = [
         Runtime(each, context=gl_context).render_radiance(placed, config_of("all", visibility="maps"))
         for each, placed in ((scene, view), (scaled(scene, factor), scaled_view(view, factor)))
@@ -171,7 +172,7 @@ def test_one_bounce_without_glow_has_one_kind_of_vpls(gl_context):
     assert (every.vpl_irradiance >= alone.vpl_irradiance).all()
 
 
-@pytest.mark.parametrize("vpls", [16, 20_000])
+@pytest.mark.parametrize("vpls", [16, pytest.param(20_000, marks=pytest.mark.slow)])
 def test_points_have_later_bounces_too(gl_context, vpls):
     """Where the first VPLs are points, few or too many to be clustered; later ones are clustered always."""
     points = ArtistParameters(vpl_count=vpls, falloff_footprint=0.5, lloyd_iterations=0)

@@ -23,7 +23,7 @@ NEAREST_PIXEL = 0.7
 class ScreenSpaceIndirectPass(FramePass):
     """G-buffer, direct irradiance, VPLs → `shared_irradiance` from nearby pixels, for the filter.
 
-    The dynamic lights' irradiance has no VPLs and is left out. `punctual` is the resource with the direct light
+    The dynamic lights' irradiance has no VPLs and is left out. `punctual` is the resource with direct light
     of lamps and sky: glowing surfaces have discs, which withhold nothing.
     """
 

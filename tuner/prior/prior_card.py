@@ -62,7 +62,7 @@ def prior_card(learnt: "LearntPrior", config: TunedConfig, left_out: dict[str, s
         views=FITTED + HELD_OUT,
         width=VIEW_SIZE[0],
         height=VIEW_SIZE[1],
-        bounces="any number of times" if CONFIG.light.bounces == "all" else f"at most {CONFIG.light.bounces}×",
+        bounces=_times(CONFIG.light.most_bounces),
         counts=", ".join(map(str, learnt.fits.vpl_counts)),
         folds=FOLDS,
         figures=_figures(learnt),
@@ -71,6 +71,10 @@ def prior_card(learnt: "LearntPrior", config: TunedConfig, left_out: dict[str, s
         ranges=_ranges(learnt),
         left_out=_left_out(left_out),
     )
+
+
+def _times(bounces: int | None) -> str:
+    return "any number of times" if bounces is None else "once" if bounces == 1 else f"up to {bounces} times"
 
 
 def _ratio(learnt: "LearntPrior", of: str, against: str) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.image_file import write_png
 from vpltune.renderer.files.srgb import srgb_from_linear
@@ -50,7 +51,7 @@ def main() -> None:
     scene = read_scene(SCENE)
     camera, lights, _ = resolve_camera_and_lights(scene, SCENE, None, None)
     view = View("frame", "fitted", SIZE, camera, lights)
-    config = TunedConfig(ArtistParameters(screen_space_strength=1.0))
+    config = TunedConfig(ArtistParameters(screen_space_strength=1.0), light=ONE_BOUNCE)
     runtime = Runtime(scene, RuntimeOptions(light_path="tiles"))
     flux = LIGHTS_FLUX * flux_beside(scene, lights)
     dynamic = DynamicLights(BouncingLights(scene, DYNAMIC_LIGHTS, LIGHTS_SEED, flux).records)

@@ -7,6 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ParameterSpec
+from vpltune.renderer.config.light_settings import (
+    MOST_BOUNCES,
+    MOST_SKY_LIGHTS,
+    ONE_BOUNCE,
+    LightSettings,
+    light_schema,
+)
 from vpltune.renderer.config.quality import quality_schema
 from vpltune.renderer.files.atomic_file import write_text_whole
 
@@ -14,8 +21,8 @@ PAGE = Path(__file__).resolve().parents[1] / "docs" / "parameters.md"
 
 HEAD = """# Parameters
 
-All keys of a config's `parameters` and `quality`, as `renderer/config/artist_parameters.py` and
-`renderer/config/quality.py` define them. `python scripts/make_parameter_page.py` makes this page.
+All keys of a config's `parameters`, `quality` and `light`, as `renderer/config/artist_parameters.py`,
+`quality.py` and `light_settings.py` define them. `python scripts/make_parameter_page.py` makes this page.
 
 No parameter has a world unit. Lengths are in VPL footprints ℓ, in the scene length L, or in the distance
 between a VPL and a receiver. One config serves a scene at any scale.
@@ -36,6 +43,15 @@ QUALITY_HEAD = """
 
 Settings that trade image quality for frame time. A key that is left out has its default.
 
+"""
+
+LIGHT_HEAD = """
+## `light`
+
+Which of a scene's light is drawn. Files that lack it are of one bounce, as all were before the key.
+
+| key | default | in a file without it | allowed | meaning |
+|---|---|---|---|---|
 """
 
 QUALITY_MEANINGS = {
@@ -65,7 +81,17 @@ def page() -> str:
         for name, member in quality.items()
     ]
     quality_heading = "| key | default | allowed | meaning |\n" + "|---" * 4 + "|\n"
-    return "".join((HEAD, PARAMETERS_HEAD, heading, *rows, QUALITY_HEAD, quality_heading, *quality_rows))
+    return "".join((HEAD, PARAMETERS_HEAD, heading, *rows, QUALITY_HEAD, quality_heading, *quality_rows,
+                    LIGHT_HEAD, *_light_rows()))  # fmt: skip
+
+
+def _light_rows() -> list[str]:
+    default, absent = LightSettings().as_dict(), ONE_BOUNCE.as_dict()
+    allowed = {"bounces": f"1 … {MOST_BOUNCES}, all", "sky_lights": f"1 … {MOST_SKY_LIGHTS}"}
+    return [
+        _row((f"`{name}`", f"{default[name]}", f"{absent[name]}", allowed[name], member["description"]))
+        for name, member in light_schema()["properties"].items()
+    ]
 
 
 def _parameter_row(spec: ParameterSpec) -> str:

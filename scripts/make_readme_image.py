@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.image_file import write_png
 from vpltune.renderer.scene.files import read_scene
@@ -38,15 +39,15 @@ def main() -> None:
     """Fit the gallery without visibility maps, draw the view, and write the row of images."""
     scene = read_scene(SCENE)
     view = View("round the corner", "held_out", SIZE, Camera(look_at(EYE, TARGET), YFOV), scene.lights)
-    references = reference_views(scene, (view,), max_samples=SAMPLES)
-    untuned = TunedConfig(visibility="transmittance")
+    references = reference_views(scene, (view,), max_samples=SAMPLES, bounces=1)
+    untuned = TunedConfig(visibility="transmittance", light=ONE_BOUNCE)
     prepared = prepare_scene(SCENE, SceneOptions(), untuned, Stopwatch(), lambda *_: None)
     fitted = tuple(each for each in prepared.views if each.view.split == "fitted")
     tuned = fit_placement(fitted, untuned.parameters, robust_errors(fitted)).parameters
     configs = {
         "transmittance, untuned": untuned,
         "transmittance, tuned": untuned.with_parameters(tuned),
-        "maps, untuned": TunedConfig(visibility="maps"),
+        "maps, untuned": TunedConfig(visibility="maps", light=ONE_BOUNCE),
     }
     runtime = prepared.runtime
     (seen,) = capture_views(runtime, untuned, (view,), references)

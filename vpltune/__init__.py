@@ -1,4 +1,4 @@
-"""VPLtune: one-bounce indirect light from virtual point lights, fitted to a path tracer.
+"""VPLtune: indirect light from virtual point lights, fitted to a path tracer.
 
     import vpltune
 

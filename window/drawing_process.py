@@ -14,6 +14,7 @@ from jaxtyping import UInt8
 from PIL import Image
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import InputError, MachineError
@@ -44,6 +45,7 @@ SURFACES_ALONE = TunedConfig(
     ArtistParameters(vpl_count=1, lloyd_iterations=0),
     visibility="transmittance",
     quality=Quality(interleave=1),
+    light=ONE_BOUNCE,
 )
 """A config that takes no time: of its image only the surfaces are wanted."""
 PICK_HEIGHT = 240

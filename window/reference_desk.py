@@ -98,4 +98,4 @@ def _key(request: ReferenceRequest) -> str:
     """All that the reference depends on, as text."""
     view: View = request.view
     lights = [light_to_json(light) for light in view.lights]
-    return repr((view.size, camera_to_json(view.camera), lights, request.seconds))
+    return repr((view.size, camera_to_json(view.camera), lights, request.seconds, request.bounces))

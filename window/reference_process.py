@@ -67,6 +67,7 @@ def _steps(
             (replace(view, size=size),),
             noise_target=NOISE_TARGET if divisor == 1 else 0.0,
             max_samples=samples,
+            bounces=request.bounces,
             progress=heed,
         )
         done += amount

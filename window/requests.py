@@ -158,6 +158,8 @@ class ReferenceRequest:
     view: View
     seconds: float | None
     follows: tuple[int | None, ...]
+    bounces: int | None
+    """As the config has it whose error is shown; None for all."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -321,7 +321,14 @@ class Session:
     def _reference_request(self, client: Client) -> ReferenceRequest:
         look = client.look
         assert look is not None, "a reference is of a look"
-        return ReferenceRequest(client.id, self._view(look, look.size), look.seconds, self._follows())
+        config = self.document.config(look.error_of, self._presets) or self.document.now.config
+        return ReferenceRequest(
+            client=client.id,
+            view=self._view(look, look.size),
+            seconds=look.seconds,
+            follows=self._follows(),
+            bounces=config.light.most_bounces,
+        )
 
     def _want_reference(self, client: Client) -> None:
         """Have the reference rendered that a page shows, once it rests."""

@@ -25,6 +25,7 @@ from benchmarks.harness.scene_library import (
     scenes_folder,
 )
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.image_file import write_png
@@ -43,7 +44,9 @@ from vpltune.tuner.prior.scene_generator import generated_name, generated_scene
 SIZE = (160, 90)
 """Width and height of the images in pixels. A choice."""
 CONFIG = TunedConfig(
-    ArtistParameters(vpl_count=64), quality=Quality(interleave=4, map_size=16, map_refinement=1)
+    ArtistParameters(vpl_count=64),
+    quality=Quality(interleave=4, map_size=16, map_refinement=1),
+    light=ONE_BOUNCE,
 )
 """A choice: light enough for a software renderer. The figures do not depend on it."""
 GENERATED = 12

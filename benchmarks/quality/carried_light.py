@@ -12,6 +12,7 @@ from jaxtyping import Float64, Int64, UInt8
 
 from vpltune.renderer.config.artist_parameters import parameter_spec
 from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS, AutoPrior
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, read_config
 from vpltune.renderer.files.image_file import write_png
@@ -84,6 +85,7 @@ def auto_config(prior: AutoPrior | None = None, *, rsm_resolution: int | None = 
         quality=Quality(
             interleave=INTERLEAVE, adaptation_frames=ADAPTATION_FRAMES, rsm_resolution=rsm_resolution
         ),
+        light=ONE_BOUNCE,
     )
 
 

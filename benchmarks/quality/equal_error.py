@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING
@@ -27,6 +27,7 @@ import numpy as np
 
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import OWN_SCENES, scene_and_view
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig, read_config
 from vpltune.renderer.errors import MachineError
 from vpltune.renderer.frame.frame_timing import truthful_clock
@@ -160,7 +161,7 @@ def reference_halves(scene: Path | int, effort: Effort) -> tuple[np.ndarray, np.
 
     read, view = loaded(scene, effort.size)
     (reference,) = reference_views(
-        read, (view,), seed=0, noise_target=REFERENCE_NOISE, max_samples=effort.reference_samples
+        read, (view,), seed=0, noise_target=REFERENCE_NOISE, max_samples=effort.reference_samples, bounces=1
     )
     return reference.irradiance_a, reference.irradiance_b, reference.valid
 
@@ -179,7 +180,7 @@ def equal_error(scene: Path | int, effort: Effort) -> EqualError:
 
     read, view = loaded(scene, effort.size)
     half_a, half_b, seen = reference_halves(scene, effort)
-    runtime, config = Runtime(read), read_config("default")
+    runtime, config = Runtime(read), replace(read_config("default"), light=ONE_BOUNCE)
     if truthful_clock(runtime.opengl_renderer) == "gpu":
         raise MachineError(
             f"equal_error: frames must be drawn by a software renderer, got {runtime.opengl_renderer}; "

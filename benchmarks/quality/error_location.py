@@ -11,6 +11,7 @@ from jaxtyping import Float64
 
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import present_scenes
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.tuner.evaluation.prepare_scene import SceneOptions, Stopwatch, prepare_scene
 from vpltune.tuner.fitting.fit_views import robust_errors
@@ -37,7 +38,9 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
     for index, name in enumerate(scenes):
         progress(f"error_location: {name}", index / len(scenes))
         options = SceneOptions(views=VIEWS, held_out=0)
-        prepared = prepare_scene(present[name], options, TunedConfig(), Stopwatch(), lambda *_: None)
+        prepared = prepare_scene(
+            present[name], options, TunedConfig(light=ONE_BOUNCE), Stopwatch(), lambda *_: None
+        )
         views = [pixel_errors(view) for view in prepared.views if view.lit]
         for percent, share in SHARES.items():
             held = {

@@ -13,6 +13,7 @@ import numpy as np
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import OWN_SCENES
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.gpu.gpu_context import create_context
@@ -25,7 +26,9 @@ ALPHAS = (0.25, 0.5, 0.7, 1.0)
 VPLS = 1_024
 """VPLs of the compared images. A choice."""
 POINTS = ArtistParameters(vpl_count=VPLS, density_importance=0.0, lloyd_iterations=0)
-CONVERGED = TunedConfig(replace(POINTS, vpl_count=32_768, falloff_footprint=0.25), visibility="transmittance")
+CONVERGED = TunedConfig(
+    replace(POINTS, vpl_count=32_768, falloff_footprint=0.25), visibility="transmittance", light=ONE_BOUNCE
+)
 """The config of the image that the others are compared with."""
 ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.15, 0.45))
 """Rotations of the point table, over which errors are averaged. A choice."""

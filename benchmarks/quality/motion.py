@@ -26,6 +26,7 @@ from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import own_scene, scene_and_view
 from benchmarks.tuning.default import OLD
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.atomic_file import written_whole
@@ -76,6 +77,7 @@ def _points(vpl_count: int, rsm_factor: int = 1) -> TunedConfig:
             vpl_count=vpl_count, falloff_footprint=0.5, density_importance=0.0, lloyd_iterations=0
         ),
         quality=Quality(interleave=1, rsm_resolution=RSM_RESOLUTION * rsm_factor),
+        light=ONE_BOUNCE,
     )
 
 
@@ -84,7 +86,7 @@ def variants() -> dict[str, Variant]:
     few = _points(VPL_COUNT)
     return {
         "old_default": Variant(OLD),
-        "default": Variant(TunedConfig(), against="old_default"),
+        "default": Variant(TunedConfig(light=ONE_BOUNCE), against="old_default"),
         "neither": Variant(few, RuntimeOptions(rsm_filtering=1, rsm_snapping=False)),
         "snapping": Variant(few, RuntimeOptions(rsm_filtering=1), "neither"),
         "filtering": Variant(few, RuntimeOptions(rsm_snapping=False), "neither"),
@@ -273,7 +275,7 @@ def _set_pose(runtime: Runtime, clip: Clip, frame: int) -> None:
 
 def write_clip(path: Path, clip: Clip) -> None:
     """Write a clip, drawn with the default config; all frames have the exposure of the first."""
-    runtime, config, state = Runtime(clip.scene), TunedConfig(), ClipState()
+    runtime, config, state = Runtime(clip.scene), TunedConfig(light=ONE_BOUNCE), ClipState()
     views = [replace(view, size=CLIP_SIZE) for view in clip.views]
     _set_pose(runtime, clip, 0)
     exposure = runtime.draw(views[0], config).read_exposure()

@@ -8,6 +8,8 @@ from collections.abc import Callable
 
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import REPOSITORY, present_scenes
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.tuner.evaluation.evaluate import SPLITS
 from vpltune.tuner.scene_fit.fit_scene import FitOptions, fit_scene
 
@@ -24,7 +26,7 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
         fitted = fit_scene(
             path,
             output,
-            FitOptions(views=VIEWS),
+            FitOptions(start=TunedConfig(light=ONE_BOUNCE), views=VIEWS),
             lambda stage, share, name=name: progress(f"{name}: {stage}", share),
         )
         for split in SPLITS:

@@ -19,6 +19,7 @@ from jaxtyping import Float64, Int64
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import present_scenes
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.scene.scene import Scene
 from vpltune.renderer.scene.transforms import transform_points
@@ -62,7 +63,7 @@ FAR = 1e3
 """Distance in units of L of the wall that stands where no point was splatted at all: beyond any scene."""
 LEAST_HEIGHT = 1e-9
 """World units above the VPL's plane to which lower points are lifted, so that every direction is finite."""
-CONFIG = TunedConfig(ArtistParameters(vpl_count=VPLS))
+CONFIG = TunedConfig(ArtistParameters(vpl_count=VPLS), light=ONE_BOUNCE)
 
 
 @dataclass(frozen=True, eq=False)

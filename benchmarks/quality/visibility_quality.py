@@ -21,6 +21,7 @@ import numpy as np
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import present_scenes
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.atomic_file import write_text_whole
@@ -37,9 +38,11 @@ FITTED_VIEWS = 2
 """Views of each scene that are fitted; a third is held out. A choice."""
 DEFAULT = ArtistParameters(vpl_count=VPLS)
 CONFIGS = {
-    "transmittance": TunedConfig(DEFAULT, visibility="transmittance"),
-    "maps": TunedConfig(DEFAULT, visibility="maps"),
-    "maps_unrefined": TunedConfig(DEFAULT, visibility="maps", quality=Quality(map_refinement=1)),
+    "transmittance": TunedConfig(DEFAULT, visibility="transmittance", light=ONE_BOUNCE),
+    "maps": TunedConfig(DEFAULT, visibility="maps", light=ONE_BOUNCE),
+    "maps_unrefined": TunedConfig(
+        DEFAULT, visibility="maps", quality=Quality(map_refinement=1), light=ONE_BOUNCE
+    ),
 }
 """The untuned config of each kind of visibility."""
 UNREFINED = "maps_unrefined"

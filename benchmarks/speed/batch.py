@@ -74,7 +74,18 @@ def _batch_seconds(library: Path, folder: Path, name: str, workers: int) -> floa
         shutil.copytree(
             folder / "machine.cache", cache, ignore=shutil.ignore_patterns("references", "machine")
         )
-    command = [sys.executable, "-m", "vpltune", "batch", str(library), "-o", str(folder / name), "--json"]
+    command = [
+        sys.executable,
+        "-m",
+        "vpltune",
+        "batch",
+        str(library),
+        "-o",
+        str(folder / name),
+        "--bounces",
+        "1",
+        "--json",
+    ]
     started = time.perf_counter()
     finished = subprocess.run(
         [*command, "--workers", str(workers)],

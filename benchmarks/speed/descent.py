@@ -18,6 +18,7 @@ from jaxtyping import Array, Float
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import present_scenes
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.tuner.evaluation.prepare_scene import SceneOptions, Stopwatch, prepare_scene
 from vpltune.tuner.fitting.descent import Residuals
@@ -45,7 +46,9 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
     made = []
     for index, (name, path) in enumerate(scenes.items()):
         progress(f"descent: {name}", index / len(scenes))
-        prepared = prepare_scene(path, SceneOptions(), TunedConfig(), Stopwatch(), lambda *_: None)
+        prepared = prepare_scene(
+            path, SceneOptions(), TunedConfig(light=ONE_BOUNCE), Stopwatch(), lambda *_: None
+        )
         fitted = tuple(view for view in prepared.views if view.view.split == "fitted")
         if any(view.lit for view in fitted):
             ready = fit_placement(fitted, ArtistParameters(), robust_errors(fitted), turns=1).views

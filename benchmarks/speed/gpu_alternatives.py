@@ -11,6 +11,7 @@ from benchmarks.harness.row import Row
 from benchmarks.speed.gpu_frames import SIZES, MeasuredScene
 from benchmarks.speed.gpu_lights import moving_lights
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.frame_timing import frame_milliseconds
@@ -40,7 +41,7 @@ PYTHON_LIMIT_MS = 1.0
 def alternative_rows(measured: MeasuredScene) -> Iterator[Row]:
     """The gather against a draw for each VPL, placement against a read-back, and Python's part of a frame."""
     points = ArtistParameters(vpl_count=VPL_COUNT, lloyd_iterations=0, density_importance=0.0)
-    config = TunedConfig(points, visibility="transmittance", quality=Quality(interleave=1))
+    config = TunedConfig(points, visibility="transmittance", quality=Quality(interleave=1), light=ONE_BOUNCE)
     drawn = measured.runtime().draw(measured.sized(SIZES[SIZE]), config)
     milliseconds = measured.pass_milliseconds(drawn)
     context = measured.context
@@ -74,7 +75,7 @@ def alternative_rows(measured: MeasuredScene) -> Iterator[Row]:
 
 def python_row(measured: MeasuredScene) -> Row:
     """CPU time of the default frame with moving lights, where every draw, dispatch and clear does nothing."""
-    config = TunedConfig()
+    config = TunedConfig(light=ONE_BOUNCE)
     runtime = measured.runtime(RuntimeOptions(light_path="tiles"))
     moving = moving_lights(measured, PYTHON_LIGHTS)
     lights = DynamicLights(moving.records)

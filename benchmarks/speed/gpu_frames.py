@@ -10,6 +10,7 @@ from benchmarks.harness.machine_rates import MachineRates
 from benchmarks.harness.row import Row
 from benchmarks.speed.frame_limits import pass_limits
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import VISIBILITIES, TunedConfig
 from vpltune.renderer.frame.drawn_frame import DrawnFrame
@@ -22,7 +23,7 @@ from vpltune.renderer.scene.views import View
 SIZES = {"720p": (1280, 720), "1080p": (1920, 1080), "1440p": (2560, 1440), "4K": (3840, 2160)}
 """Width and height of the frames in pixels."""
 PASS_SIZE = "1080p"
-PASS_CONFIG = TunedConfig()
+PASS_CONFIG = TunedConfig(light=ONE_BOUNCE)
 """The config of the pass rows: the default."""
 COUNTS = (64, 256, 1024, 4096)
 """VPLs of the frames. A choice."""
@@ -123,6 +124,7 @@ def frame_rows(measured: MeasuredScene) -> Iterator[Row]:
                     config = TunedConfig(
                         ArtistParameters(vpl_count=count, lloyd_iterations=iterations),
                         quality=Quality(interleave=interleave),
+                        light=ONE_BOUNCE,
                     )
                     runtime = measured.runtime()
                     drawn = runtime.draw(view, config)

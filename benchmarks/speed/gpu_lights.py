@@ -7,6 +7,7 @@ from dataclasses import replace
 from benchmarks.harness.row import Row
 from benchmarks.speed.gpu_frames import SIZES, MeasuredScene, Series
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime_options import LightPath, RuntimeOptions
@@ -27,7 +28,10 @@ PER_DRAW_LIGHTS = 100
 WARM_UP_LIGHTS = 10
 """Lights of an untimed draw before. A choice."""
 PRE_PASS_CONFIG = TunedConfig(
-    ArtistParameters(vpl_count=1), visibility="transmittance", quality=Quality(rsm_resolution=64)
+    ArtistParameters(vpl_count=1),
+    visibility="transmittance",
+    quality=Quality(rsm_resolution=64),
+    light=ONE_BOUNCE,
 )
 """As little beside the light pre-pass as a frame can have."""
 

@@ -9,12 +9,13 @@ tuned on one scene score 0.86 and 0.74 on the other.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import OUTSIDE_SCENES, scenes_folder
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import read_config
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.files import read_scene
@@ -87,8 +88,12 @@ def rows(progress: Callable[[str, float], None]) -> list[Row]:
 def _rows_of(scene: PeerScene) -> list[Row]:
     loaded = read_scene(scenes_folder() / scene.name / OUTSIDE_SCENES[scene.name])
     view = View(scene.name, "fitted", SIZE, _camera(scene), (_light(scene),))
-    references = reference_views(loaded, (view,), seed=0, noise_target=NOISE_TARGET, max_samples=MAX_SAMPLES)
-    (captured,) = capture_views(Runtime(loaded), read_config("default"), (view,), references)
+    references = reference_views(
+        loaded, (view,), seed=0, noise_target=NOISE_TARGET, max_samples=MAX_SAMPLES, bounces=1
+    )
+    (captured,) = capture_views(
+        Runtime(loaded), replace(read_config("default"), light=ONE_BOUNCE), (view,), references
+    )
     drawn = captured.captured.indirect_irradiance[captured.valid]
     truth = references[0].irradiance[captured.valid]
     error, energy = relmse(drawn, truth), energy_ratio(drawn, truth)

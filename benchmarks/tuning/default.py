@@ -31,6 +31,7 @@ from benchmarks.harness.scene_library import (
     present_scenes,
 )
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.atomic_file import write_text_whole, written_whole
@@ -63,9 +64,10 @@ FIGURES = ("relmse", "trimmed_relmse", "flip", "median_error")
 OLD = TunedConfig(
     ArtistParameters(falloff_footprint=0.5, vpl_count=1024, density_importance=0.0, lloyd_iterations=0),
     quality=Quality(interleave=1, map_size=24),
+    light=ONE_BOUNCE,
 )
 """The default of version 0.1: 1,024 points, of which every pixel gathers all."""
-DEFAULT = TunedConfig()
+DEFAULT = TunedConfig(light=ONE_BOUNCE)
 
 
 def _discs(**changes: Any) -> TunedConfig:
@@ -192,7 +194,7 @@ def _figures(
     views = views_for_scene(
         scene, scene.cameras[0], scene.lights, fitted=1, held_out=VIEWS - 1, size=ERROR_SIZE, seed=0
     )
-    references = reference_views(scene, views, noise_target=NOISE_TARGET, max_samples=MAX_SAMPLES)
+    references = reference_views(scene, views, noise_target=NOISE_TARGET, max_samples=MAX_SAMPLES, bounces=1)
     runtime = Runtime(scene, context=context)
     figures = {}
     for name, config in configs.items():

@@ -19,6 +19,7 @@ import numpy as np
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import REPOSITORY, present_scenes, scene_and_view
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.atomic_file import write_text_whole, written_whole
@@ -177,18 +178,18 @@ def measured_curves(name: str, path: Path, progress: Progress) -> SceneCurves:
     fitted_views = [view for view in views if view.view.split == "fitted"]
     rotations = table_rotations(ROTATIONS, 0)
     progress(f"{name}: density", 0.0)
-    start = TunedConfig(ArtistParameters(vpl_count=FITTED_COUNT))
+    start = TunedConfig(ArtistParameters(vpl_count=FITTED_COUNT), light=ONE_BOUNCE)
     found = fit_density(runtime, fitted_views, start, rotations=rotations).parameters
     curves: dict[str, Curve] = {variant: {} for variant in VARIANTS}
     fits: dict[int, ArtistParameters] = {}
     for index, count in enumerate(COUNTS):
         progress(f"{name}: {count} VPLs", index / len(COUNTS))
-        drawn = TunedConfig(replace(found, vpl_count=count))
+        drawn = TunedConfig(replace(found, vpl_count=count), light=ONE_BOUNCE)
         rotated = rotated_views(runtime, fitted_views, drawn, rotations)
         tuned = _fit(rotated, drawn.parameters).parameters
         fits[count] = tuned
         for variant, parameters in (*_UNFITTED.items(), ("fitted", tuned)):
-            config = TunedConfig(replace(parameters, vpl_count=count))
+            config = TunedConfig(replace(parameters, vpl_count=count), light=ONE_BOUNCE)
             curves[variant][count] = _error(runtime, views, config)
     curves["interleaved"] = {
         side: _error(runtime, views, _interleaved(fits[FITTED_COUNT * side**2], side)) for side in INTERLEAVES
@@ -233,7 +234,7 @@ def relaxation_rows(names: Sequence[str], present: Mapping[str, Path], progress:
         progress(f"{name}: Lloyd iterations", 0.0)
         prepared = _prepared(present[name])
         for count, found in logs.items():
-            config = TunedConfig(replace(discs, lloyd_iterations=count))
+            config = TunedConfig(replace(discs, lloyd_iterations=count), light=ONE_BOUNCE)
             found.append(np.log(_error(prepared.runtime, prepared.views, config)))
     error = {count: float(np.exp(np.mean(found))) for count, found in logs.items()}
     against = f"{LLOYD_ITERATIONS} Lloyd iterations, {FITTED_COUNT} discs"
@@ -264,7 +265,7 @@ def slope_row(name: str, path: Path, progress: Progress) -> Row:
     for index, importance in enumerate(places):
         progress(f"{name}: slopes", index / len(places))
         start = replace(_OLD, vpl_count=FITTED_COUNT, density_importance=float(importance))
-        rotated = rotated_views(runtime, fitted_views, TunedConfig(start), rotations)
+        rotated = rotated_views(runtime, fitted_views, TunedConfig(start, light=ONE_BOUNCE), rotations)
         losses.append(_fit(rotated, start).descent.loss)
     trend = np.polynomial.Polynomial.fit(places, losses, 2)
     agree = np.mean(np.sign(np.diff(losses)) == np.sign(np.diff(trend(places))))
@@ -301,12 +302,12 @@ def write_curves(folder: Path, curves: Sequence[SceneCurves]) -> None:
 
 
 def _prepared(path: Path) -> PreparedScene:
-    config = TunedConfig(ArtistParameters(vpl_count=FITTED_COUNT))
+    config = TunedConfig(ArtistParameters(vpl_count=FITTED_COUNT), light=ONE_BOUNCE)
     return prepare_scene(path, SceneOptions(size=SIZE), config, Stopwatch(), lambda stage, share: None)
 
 
 def _interleaved(parameters: ArtistParameters, side: int) -> TunedConfig:
-    return TunedConfig(parameters, quality=Quality(interleave=side))
+    return TunedConfig(parameters, quality=Quality(interleave=side), light=ONE_BOUNCE)
 
 
 def _error(runtime: Runtime, views: Sequence[CapturedView], config: TunedConfig) -> float:

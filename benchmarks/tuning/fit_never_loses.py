@@ -21,6 +21,7 @@ from benchmarks.harness.program_digest import program_digest
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import REPORTED_SEED, REPOSITORY, present_scenes
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.renderer.files.strict_json import strict_json
 from vpltune.tuner.evaluation.guard import UNSEEN
@@ -113,7 +114,7 @@ def _measure(work: tuple[Cell, Path]) -> str:
     else:
         scene = Path(cell.scene)
     start = ArtistParameters() if cell.mode == "default" else replace(ArtistParameters(), vpl_count=FEW)
-    options = FitOptions(start=TunedConfig(start), held_out=HELD_OUT)
+    options = FitOptions(start=TunedConfig(start, light=ONE_BOUNCE), held_out=HELD_OUT)
     document = fit_scene(scene, folder / cell.name / cell.mode, options, lambda *_: None).document
     write_text_whole(folder / cell.file, strict_json(result_of(cell, document)) + "\n")
     return f"{cell.name}, {cell.mode}"

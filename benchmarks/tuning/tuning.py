@@ -50,6 +50,7 @@ from benchmarks.tuning.tuning_objectives import (
 )
 from benchmarks.tuning.tuning_searches import SEARCHES
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.atomic_file import write_text_whole
@@ -177,7 +178,7 @@ class _Problem:
 
 def _problem(path: Path) -> _Problem:
     base = ArtistParameters(vpl_count=VPLS)
-    config = TunedConfig(base, quality=Quality(rsm_resolution=RSM_RESOLUTION))
+    config = TunedConfig(base, quality=Quality(rsm_resolution=RSM_RESOLUTION), light=ONE_BOUNCE)
     options = SceneOptions(size=SIZE, views=VIEWS)
     prepared = prepare_scene(path, options, config, Stopwatch(), lambda stage, share: None)
     runtime = CountingRuntime(prepared.scene, context=prepared.runtime.context)

@@ -22,7 +22,7 @@ def config_schema() -> dict[str, Any]:
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "VPLtune config",
-        "description": "Tuned parameters of one-bounce indirect light; none has a world unit.",
+        "description": "Tuned parameters of indirect light; none has a world unit.",
         "type": "object",
         "required": ["format", "version", "parameters"],
         "additionalProperties": False,

@@ -23,7 +23,7 @@ class LightSettings:
         InputError: a field is out of range.
     """
 
-    bounces: Bounces = 1
+    bounces: Bounces = "all"
     """Reflections, at most, before light reaches the surface that the camera sees: 1 to 64, or "all"."""
 
     sky_lights: int = 32
@@ -57,7 +57,7 @@ class LightSettings:
 
     @classmethod
     def validated(cls, values: Any, where: str) -> "LightSettings":
-        """The part from a file's content; keys that are absent have their defaults.
+        """The part from a file's content; keys that are absent are as in `ONE_BOUNCE`.
 
         Raises:
             InputError: not an object, an unknown key, or a value out of range. `where` names it.
@@ -70,8 +70,8 @@ class LightSettings:
                 raise InputError(f"{where}: unknown key {key!r:.60}; known are {', '.join(known)}")
         # Checked before the object exists, so that the error names the file.
         unchecked = object.__new__(cls)
-        for name, spec in known.items():
-            value: Any = values.get(name, spec.default)
+        for name in known:
+            value: Any = values.get(name, getattr(ONE_BOUNCE, name))
             # Some programs write 3 as 3.0.
             whole = isinstance(value, float) and value.is_integer()
             object.__setattr__(unchecked, name, int(value) if whole else value)
@@ -79,24 +79,29 @@ class LightSettings:
         return cls(unchecked.bounces, unchecked.sky_lights)
 
 
+ONE_BOUNCE = LightSettings(bounces=1)
+"""What a config file has that says nothing of its light: such files are older than the key, and their
+parameters were fitted to one bounce. Figures that were measured before there was more are of it too."""
+
+
 def light_schema() -> dict[str, Any]:
     """JSON Schema of the key `light`."""
     return {
-        "description": "Which of a scene's light is drawn.",
+        "description": "Which of a scene's light is drawn. Files without it are of one bounce.",
         "type": "object",
         "additionalProperties": False,
         "properties": {
             "bounces": {
                 "description": "Reflections, at most, before light reaches what the camera sees.",
                 "anyOf": [{"const": "all"}, {"type": "integer", "minimum": 1, "maximum": MOST_BOUNCES}],
-                "default": LightSettings().bounces,
+                "default": ONE_BOUNCE.bounces,
             },
             "sky_lights": {
                 "description": "Directional lights that stand for the scene's sky or environment.",
                 "type": "integer",
                 "minimum": 1,
                 "maximum": MOST_SKY_LIGHTS,
-                "default": LightSettings().sky_lights,
+                "default": ONE_BOUNCE.sky_lights,
             },
         },
     }

@@ -10,7 +10,7 @@
 | `visibility` | what occludes VPLs: `maps`, or `transmittance` alone; optional, `maps` by default |
 | `auto` | a learnt prior that sets some parameters in every frame (`renderer.config.auto_prior`); optional |
 | `fit` | how the fit that wrote the file ended; optional |
-| `light` | which of the scene's light is drawn: `bounces`, 1 to 64 or "all"; optional |
+| `light` | which of the scene's light is drawn: `bounces`, 1 to 64 or "all"; without it, one bounce |
 | `provenance` | where the numbers come from; kept and not acted on; optional |
 | `checksum` | SHA-256 of all the rest; optional, but a wrong one is refused |
 
@@ -31,7 +31,7 @@ from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistP
 from vpltune.renderer.config.auto_prior import AutoPrior
 from vpltune.renderer.config.config_versions import brought_forward
 from vpltune.renderer.config.gltf_extras import GLTF_SUFFIXES, read_gltf_extras
-from vpltune.renderer.config.light_settings import LightSettings
+from vpltune.renderer.config.light_settings import ONE_BOUNCE, LightSettings
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
@@ -207,8 +207,7 @@ def _document(config: TunedConfig) -> dict[str, Any]:
     }
     if config.auto is not None:
         document["auto"] = config.auto.as_dict()
-    if config.light != LightSettings():
-        document["light"] = config.light.as_dict()
+    document["light"] = config.light.as_dict()
     if config.fit is not None:
         document["fit"] = {"status": config.fit.status, "sentence": config.fit.sentence}
     if config.provenance:
@@ -310,7 +309,13 @@ def _checked_provenance(provenance: Any, where: str) -> dict[str, str | int | fl
 
 
 def _check_checksum(checksum: Any, config: TunedConfig, where: str) -> None:
-    if checksum != _checksum(_document(config)):
+    document = _document(config)
+    right = [_checksum(document)]
+    if config.light == ONE_BOUNCE:
+        # Files that are older than the key have a checksum without it.
+        del document["light"]
+        right.append(_checksum(document))
+    if checksum not in right:
         file = shlex.quote(where)
         # JSON alone in the place of a glTF file would be the end of its scene.
         form = f"gltf --scene {file}" if Path(where).suffix.lower() in GLTF_SUFFIXES else "json"

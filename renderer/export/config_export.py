@@ -43,6 +43,17 @@ def refuse_prior(config: TunedConfig, form: str) -> None:
         )
 
 
+def beyond_constants(config: TunedConfig, form: str) -> tuple[str, ...]:
+    """What constants do not say how to draw, a sentence each; empty for a form that is a config."""
+    if form == "json" or config.light.bounces == 1:
+        return ()
+    return (f"the numbers go with {_bounces(config)} of light: a shader that draws one has less light",)
+
+
+def _bounces(config: TunedConfig) -> str:
+    return "all bounces" if config.light.bounces == "all" else f"{config.light.bounces} bounces"
+
+
 def glsl_constants(config: TunedConfig) -> str:
     """Constant declarations, valid in GLSL 3.30 and later and in GLSL ES 3.00.
 
@@ -58,6 +69,7 @@ def glsl_constants(config: TunedConfig) -> str:
     values = _checked(config)
     lines = [
         "// Written by `vpltune export --to glsl`. No value has a world unit.",
+        *(f"// VPL_BOUNCES: {sentence}." for sentence in beyond_constants(config, "glsl")),
         "#ifdef VPL_PARAMETER_BLOCK",
     ]
     lines += ["layout(std140) uniform VplParameters {"]
@@ -97,6 +109,7 @@ def c_header(config: TunedConfig) -> str:
     return "\n".join(
         [
             "/* Written by `vpltune export --to c`. No value has a world unit. */",
+            *(f"/* VPL_BOUNCES: {sentence}. */" for sentence in beyond_constants(config, "c")),
             "#ifndef VPLTUNE_PARAMETERS_H",
             "#define VPLTUNE_PARAMETERS_H",
             "#include <stdint.h>",
@@ -131,9 +144,11 @@ def _glsl_type(spec: ParameterSpec) -> str:
 
 
 def _quality_constants(config: TunedConfig) -> dict[str, int]:
-    """The quality settings that another engine can follow; 0 leaves interleaving or resolution to it."""
+    """The settings that another engine can follow; 0 leaves interleaving or resolution to it, and stands for
+    all bounces."""
     quality = config.quality
     return {
+        "VPL_BOUNCES": config.light.most_bounces or 0,
         "VPL_INTERLEAVE": 0 if quality.interleave == "auto" else quality.interleave,
         "VPL_MAP_SIZE": quality.map_size,
         "VPL_MAP_REFINEMENT": quality.map_refinement,

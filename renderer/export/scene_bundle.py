@@ -50,8 +50,11 @@ class SceneBundle:
 
     document: dict[str, Any]
     binary: bytes
-    drawn_whole: tuple[str, ...] = ()
-    """Names of the materials that are not opaque, which a bundle has not."""
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """What of the config and the scene is not drawn outside the runtime, a sentence each."""
+        return tuple(self.document["left_out"])
 
 
 def scene_bundle(scene: Scene, view: View, config: TunedConfig) -> SceneBundle:
@@ -72,11 +75,13 @@ def scene_bundle(scene: Scene, view: View, config: TunedConfig) -> SceneBundle:
     _add_light_records(view, records, resolution, binary)
     columns, rows = _atlas(records)
     uniforms = camera_uniforms(view.camera, view.size, bounds)
+    drawn_whole = tuple(material.name for material in scene.materials if not material.is_opaque)
     document = {
         "format": FORMAT,
         "version": VERSION,
         "scene": scene.name,
         "config": json.loads(config_text(config)),
+        "left_out": list(left_out(config, view.size, drawn_whole, _other_light(scene))),
         "view": {
             "size": list(view.size),
             "camera_to_world": view.camera.to_world.tolist(),
@@ -102,8 +107,14 @@ def scene_bundle(scene: Scene, view: View, config: TunedConfig) -> SceneBundle:
         "textures": [_texture(texture, binary) for texture in (*scene.textures, WHITE)],
         "arrays": binary.arrays,
     }
-    drawn_whole = tuple(material.name for material in scene.materials if not material.is_opaque)
-    return SceneBundle(document, bytes(binary.content), drawn_whole)
+    return SceneBundle(document, bytes(binary.content))
+
+
+def _other_light(scene: Scene) -> tuple[str, ...]:
+    """Light of the scene that comes from no lamp."""
+    glows = any(material.glows for material in scene.materials)
+    sky = scene.environment is not None
+    return (*(("glowing surfaces",) if glows else ()), *(("the sky",) if sky else ()))
 
 
 def _vpl_importance(config: TunedConfig, view: View) -> dict[str, Any]:
@@ -147,16 +158,25 @@ def _visibility_maps(config: TunedConfig) -> dict[str, int]:
 
 
 def left_out(
-    config: TunedConfig, frame_size: tuple[int, int], drawn_whole: tuple[str, ...] = ()
+    config: TunedConfig,
+    frame_size: tuple[int, int],
+    drawn_whole: tuple[str, ...] = (),
+    other_light: tuple[str, ...] = (),
 ) -> tuple[str, ...]:
     """What of a config and its scene is not drawn outside the runtime, a sentence each.
 
     Args:
         config: what is drawn with.
         frame_size: in pixels.
-        drawn_whole: `SceneBundle.drawn_whole`.
+        drawn_whole: names of the materials that are not opaque.
+        other_light: what else than lamps lights the scene.
     """
     sentences = []
+    later = () if config.light.bounces == 1 else ("light that is reflected more than once",)
+    if later or other_light:
+        *others, last = (*later, *(f"light of {each}" for each in other_light))
+        missing = f"{', '.join(others)} and {last}" if others else last
+        sentences.append(f"Only the first bounce of lamps is drawn here: {missing} is left out")
     if drawn_whole:
         names = ", ".join(drawn_whole[:_NAMES_SHOWN]) + (", …" if len(drawn_whole) > _NAMES_SHOWN else "")
         sentences.append(f"See-through surfaces are left out here, or drawn whole if half opaque ({names})")

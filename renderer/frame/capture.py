@@ -80,6 +80,8 @@ class CapturedFrame:
     """Radius of the disc that the VPL stands for."""
     vpl_flux: Float32[np.ndarray, "vpls 3"]
     """Reflected radiant flux [W]."""
+    asked_vpls: int
+    """VPLs, from the first on, that the config's VPL count asks for; any others hold later light."""
     vpls_are_discs: bool
     """Whether they shine as discs, and not as points."""
     visibility_maps: VisibilityMaps | None
@@ -133,6 +135,7 @@ def capture_frame(frame: Frame, view: View, *, discs: bool, maps: bool = True) -
         vpl_normal_world=vpls[:, 4:7],
         vpl_footprint=vpls[:, 3],
         vpl_flux=vpls[:, 8:11],
+        asked_vpls=frame.setup.pools.asked,
         vpls_are_discs=discs,
         visibility_maps=_visibility_maps(frame) if maps else None,
         scene_length=float(statistics[2]),

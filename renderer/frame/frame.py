@@ -159,7 +159,7 @@ class Frame:
             self._statistics = SceneStatisticsPass(resources, setup.maps)
             self._placed.append(self._statistics)
             self._placed.append(AutoParametersPass(resources, setup.prior, setup.adaptation_frames))
-        near_field = ScreenSpaceIndirectPass(resources, rsm, cells)
+        near_field = ScreenSpaceIndirectPass(resources, rsm, cells, punctual)
         self._gathered: list[FramePass] = [
             *([] if glowing is None else [GatherGlowingPass(resources, setup.maps, setup.pools)]),
             VplGatherPass(resources, setup.interleave, setup.maps, setup.pools),

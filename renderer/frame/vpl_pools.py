@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from vpltune.renderer.config.artist_parameters import LARGEST_DISC_COUNT
 from vpltune.renderer.frame.disc_samples import sample_count
 
 VPL_BYTES = 48
@@ -40,6 +41,11 @@ class VplPools:
         glowing = _share(GLOWING_SHARE, count)
         # One VPL stays where there is no lamp: a buffer cannot be empty. It has no flux.
         return cls(count, _share(LATER_SHARE, count), glowing) if has_lights else cls(1, count, glowing)
+
+    @property
+    def asked(self) -> int:
+        """VPLs that the config's count asks for: the first pool, or without lamps that of later light."""
+        return max(self.first, self.later)
 
     @property
     def reflected(self) -> int:
@@ -83,4 +89,4 @@ class DiscPool:
 
 
 def _share(share: float, count: int) -> int:
-    return max(1, round(share * count))
+    return min(LARGEST_DISC_COUNT, max(1, round(share * count)))

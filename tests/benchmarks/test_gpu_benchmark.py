@@ -14,6 +14,7 @@ from benchmarks.speed.frame_limits import lights_per_pixel, pass_bytes, pass_lim
 from benchmarks.speed.gpu_frames import MeasuredScene, Series, Timing, frame_count, frame_rows, pass_rows
 from benchmarks.speed.surrogate import FLOPS_PER_PAIR
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -25,6 +26,7 @@ PLAIN = TunedConfig(
     ArtistParameters(vpl_count=16, lloyd_iterations=0),
     visibility="transmittance",
     quality=Quality(interleave=1, rsm_resolution=64),
+    light=ONE_BOUNCE,
 )
 
 
@@ -58,7 +60,10 @@ def test_operations_of_the_gather_are_counted_by_pair(runtime):
     drawn = runtime.draw(room_view(size=SIZE), PLAIN)
     assert pass_operations(drawn, PLAIN, 100)["vpl_gather"] == 32 * 24 * 16 * FLOPS_PER_PAIR
     shared = TunedConfig(
-        PLAIN.parameters, visibility="transmittance", quality=Quality(interleave=4, rsm_resolution=64)
+        PLAIN.parameters,
+        visibility="transmittance",
+        quality=Quality(interleave=4, rsm_resolution=64),
+        light=ONE_BOUNCE,
     )
     drawn = runtime.draw(room_view(size=SIZE), shared)
     assert pass_operations(drawn, shared, 100)["vpl_gather"] == 32 * 24 * FLOPS_PER_PAIR
@@ -99,7 +104,9 @@ def test_rows_of_a_small_table(gl_context, monkeypatch):
     """Each pass and each frame has a row beside its limit."""
     monkeypatch.setattr(gpu_frames, "SIZES", {"1080p": SIZE})
     monkeypatch.setattr(gpu_frames, "COUNTS", (4, 16))
-    monkeypatch.setattr(gpu_frames, "PASS_CONFIG", TunedConfig(ArtistParameters(vpl_count=16)))
+    monkeypatch.setattr(
+        gpu_frames, "PASS_CONFIG", TunedConfig(ArtistParameters(vpl_count=16), light=ONE_BOUNCE)
+    )
     measured = measured_room(gl_context)
     passes = {row.name: row for row in pass_rows(measured)}
     assert {"pass.1080p.maps.vpl_visibility_maps", "pass.1080p.transmittance.vpl_gather"} < set(passes)

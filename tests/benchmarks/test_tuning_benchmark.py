@@ -23,6 +23,7 @@ from benchmarks.tuning.tuning_objectives import (
 )
 from benchmarks.tuning.tuning_searches import SEARCHES
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.tuner.fitting.fit_density import rotated_views
@@ -95,7 +96,7 @@ def test_searches_one_after_the_other_share_a_trace_and_a_clock():
 def test_the_surrogate_stands_for_the_runtime(gl_context):
     """All seven parameters away from the defaults: to 1e-3, and the runtime's frames are counted."""
     base = ArtistParameters(vpl_count=24, lloyd_iterations=2)
-    config = TunedConfig(base, quality=Quality(rsm_resolution=128))
+    config = TunedConfig(base, quality=Quality(rsm_resolution=128), light=ONE_BOUNCE)
     runtime = CountingRuntime(colored_room(), context=gl_context)
     view, rotations = corner_view("spot", (24, 18)), ((0.0, 0.0), (0.3, 0.6))
     captured = runtime.capture(view, config)

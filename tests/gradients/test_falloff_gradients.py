@@ -12,6 +12,7 @@ from corner import corner
 from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.fitting.search_space import SearchSpace
@@ -23,7 +24,7 @@ from vpltune.tuner.surrogate.vpl_gather import FalloffParameters, gather, gather
 CELLS = ArtistParameters(vpl_count=64, lloyd_iterations=4, falloff_footprint=0.9, extinction_coefficient=0.6)
 START = point_vpls(intensity=1.4, falloff_footprint=0.7, extinction_coefficient=0.6, vpl_count=256)
 STEP = {"intensity": 0.05, "falloff_footprint": 0.05, "extinction_coefficient": 0.05}
-WITHOUT_MAPS = TunedConfig(point_vpls(), visibility="transmittance")
+WITHOUT_MAPS = TunedConfig(point_vpls(), visibility="transmittance", light=ONE_BOUNCE)
 
 
 @pytest.mark.parametrize("start", [START, CELLS], ids=["points", "cells"])

@@ -5,6 +5,7 @@ import pytest
 from card_over_floor import card_over_floor, view_down, view_of_ceiling
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.scene import scaled
@@ -12,7 +13,7 @@ from vpltune.renderer.scene.views import scaled_view
 from vpltune.tuner.reference import reference_views
 from vpltune.tuner.reference.reference_view import ReferenceView
 
-FEW = TunedConfig(ArtistParameters(vpl_count=256))
+FEW = TunedConfig(ArtistParameters(vpl_count=256), light=ONE_BOUNCE)
 ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.15, 0.45))
 
 
@@ -29,7 +30,9 @@ def test_direct_light_passes_by_its_share(gl_context, opacity, cards):
     expected = 3.0 * (1.0 - opacity) ** cards
     frame = Runtime(scene, context=gl_context).capture(view_down(0.45, (16, 16)), FEW)
     np.testing.assert_allclose(frame.direct_irradiance, expected, rtol=1e-4)
-    (reference,) = reference_views(scene, (view_down(0.45, (16, 16)),), noise_target=1.0, max_samples=1)
+    (reference,) = reference_views(
+        scene, (view_down(0.45, (16, 16)),), noise_target=1.0, max_samples=1, bounces=1
+    )
     np.testing.assert_allclose(reference.direct_irradiance, expected, rtol=1e-4)
 
 
@@ -41,7 +44,7 @@ def test_the_camera_sees_what_is_half_opaque(gl_context, opacity, is_seen):
     frame = Runtime(scene, context=gl_context).capture(view, FEW)
     middle = frame.position_world[8, 8, 1]
     assert middle == pytest.approx(0.5 if is_seen else 0.0, abs=1e-3)
-    (reference,) = reference_views(scene, (view,), noise_target=1.0, max_samples=1)
+    (reference,) = reference_views(scene, (view,), noise_target=1.0, max_samples=1, bounces=1)
     assert reference.position_world[8, 8, 1] == pytest.approx(middle, abs=1e-3)
     expected = 3.0 if is_seen else 3.0 * (1.0 - opacity)
     assert frame.direct_irradiance[8, 8, 0] == pytest.approx(expected, rel=1e-4)
@@ -73,13 +76,13 @@ def test_light_of_a_lit_floor_passes_by_its_share(gl_context, opacity, cards):
     share = (1.0 - opacity) ** cards
     means = []
     for scene in (through, open_):
-        (reference,) = reference_views(scene, (view,), noise_target=3e-4, max_samples=1024)
+        (reference,) = reference_views(scene, (view,), noise_target=3e-4, max_samples=1024, bounces=1)
         means.append(mean_and_error(reference))
     (found, error), (whole, whole_error) = means
     assert abs(found - share * whole) < 4.0 * np.hypot(error, share * whole_error)
     drawn = []
     for scene in (through, open_):
-        frames = Runtime(scene, context=gl_context).captures(view, TunedConfig(), ROTATIONS)
+        frames = Runtime(scene, context=gl_context).captures(view, TunedConfig(light=ONE_BOUNCE), ROTATIONS)
         drawn.append(np.mean([frame.indirect_irradiance.mean() for frame in frames]))
     assert drawn[0] == pytest.approx(share * drawn[1], rel=0.03)
 

@@ -12,6 +12,7 @@ from converged_views import corner_view
 from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import LARGEST_DISC_COUNT
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.clip_state import ClipState
@@ -27,7 +28,9 @@ def config_with(**parameters) -> TunedConfig:
     discs = {"vpl_count": 32, "lloyd_iterations": 4, "falloff_footprint": DISC_FOOTPRINT}
     form = discs if parameters.get("lloyd_iterations", 4) else {"vpl_count": 32}
     chosen = point_vpls(**{**form, **parameters})
-    return TunedConfig(chosen, visibility="transmittance", quality=Quality(rsm_resolution=256))
+    return TunedConfig(
+        chosen, visibility="transmittance", quality=Quality(rsm_resolution=256), light=ONE_BOUNCE
+    )
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.clip_state import ClipState
@@ -24,7 +25,9 @@ SIZE = (32, 24)
 def discs(density_importance: float) -> TunedConfig:
     """128 discs from a small RSM, without visibility, which has nothing to do with where they stand."""
     parameters = ArtistParameters(vpl_count=128, density_importance=density_importance)
-    return TunedConfig(parameters, visibility="transmittance", quality=Quality(rsm_resolution=128))
+    return TunedConfig(
+        parameters, visibility="transmittance", quality=Quality(rsm_resolution=128), light=ONE_BOUNCE
+    )
 
 
 @pytest.fixture(scope="module")

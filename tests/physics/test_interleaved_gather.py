@@ -7,6 +7,7 @@ from point_vpls import point_vpls
 from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import CapturedFrame, octahedral_decode, read_image
@@ -41,7 +42,7 @@ UNLIT = {"bevy-irradiancevolumeexample"}
 
 def captured(gl_context, scene, view, interleave, **parameters) -> CapturedFrame:
     """What the runtime draws, by default with points."""
-    config = TunedConfig(point_vpls(**parameters), quality=Quality(interleave=interleave))
+    config = TunedConfig(point_vpls(**parameters), quality=Quality(interleave=interleave), light=ONE_BOUNCE)
     return Runtime(scene, context=gl_context).capture(view, config)
 
 
@@ -357,7 +358,7 @@ def error_and_energy(gl_context, path, visibility):
     scene = read_scene(path)
     camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
     view = View(path.stem, "fitted", (640, 360), camera, lights)
-    config = TunedConfig(visibility=visibility, quality=Quality(interleave=4))
+    config = TunedConfig(visibility=visibility, quality=Quality(interleave=4), light=ONE_BOUNCE)
     runtime = Runtime(scene, context=gl_context)
     full, shared = (runtime.capture(view, each) for each in (config.with_full_gather(), config))
     images = shared.vpl_irradiance[full.valid], full.vpl_irradiance[full.valid]
@@ -393,7 +394,7 @@ def test_scenes_of_others_differ_little_from_the_full_gather(gl_context, scenes_
 
 def test_frames_repeat_bitwise(gl_context):
     """The list of pixels fills in any order; the image does not show it."""
-    view, config = room_view("spot", (96, 72)), TunedConfig(quality=Quality(interleave=4))
+    view, config = room_view("spot", (96, 72)), TunedConfig(quality=Quality(interleave=4), light=ONE_BOUNCE)
     runtime = Runtime(colored_room(), context=gl_context)
     first = runtime.capture(view, config).vpl_irradiance
     runtime.capture(room_view("point", (96, 72)), config)

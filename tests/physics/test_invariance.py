@@ -8,6 +8,7 @@ from built_scenes import ROOM_LIGHTS, colored_room, room_view
 from moving_scenes import bent_board
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -24,7 +25,9 @@ PARAMETERS = ArtistParameters(intensity=1.3, falloff_footprint=0.8, extinction_c
 
 def mean_irradiance(gl_context, view: View, vpl_count=1024, rsm_resolution=512) -> float:
     config = TunedConfig(
-        ArtistParameters(vpl_count=vpl_count), quality=Quality(rsm_resolution=rsm_resolution)
+        ArtistParameters(vpl_count=vpl_count),
+        quality=Quality(rsm_resolution=rsm_resolution),
+        light=ONE_BOUNCE,
     )
     frames = Runtime(colored_room(), context=gl_context).captures(view, config, ROTATIONS)
     return float(np.mean([frame.indirect_irradiance[frame.valid].mean() for frame in frames]))
@@ -64,7 +67,7 @@ def test_scale_changes_nothing(gl_context, light, factor):
     The bound is on the relative RMSE: where rounding moves a silhouette or a shadow's edge by a texel,
     single pixels may differ, and an RSM sample between two clusters may change its owner.
     """
-    view, config = room_view(light), TunedConfig(PARAMETERS)
+    view, config = room_view(light), TunedConfig(PARAMETERS, light=ONE_BOUNCE)
     runtime = Runtime(colored_room(), context=gl_context)
     other = Runtime(scaled(colored_room(), factor), context=gl_context)
     image = runtime.render_radiance(view, config)
@@ -93,7 +96,9 @@ def test_dynamic_lights_and_poses_follow_the_scale(gl_context, factor):
         runtime.pose(Pose(grow @ moved, np.zeros((0, 4, 4)), (), ()))
         lights = DynamicLights(scaled_records(records, scale))
         images.append(
-            runtime.render_radiance(scaled_view(view, scale), TunedConfig(PARAMETERS), lights=lights)
+            runtime.render_radiance(
+                scaled_view(view, scale), TunedConfig(PARAMETERS, light=ONE_BOUNCE), lights=lights
+            )
         )
     error = np.sqrt(np.mean((images[1] - images[0]) ** 2) / np.mean(images[0] ** 2))
     assert error < 2e-3
@@ -110,7 +115,7 @@ def test_motion_follows_the_scale(gl_context, factor):
         frames = []
         for seconds in (0.0, 1.0):
             runtime.pose(Sequence(scene, view, "none").at(seconds).pose)
-            frames.append(runtime.render_radiance(view, TunedConfig(PARAMETERS)))
+            frames.append(runtime.render_radiance(view, TunedConfig(PARAMETERS, light=ONE_BOUNCE)))
         images.append(np.stack(frames))
     assert np.abs(images[0][1] - images[0][0]).mean() > 0.01 * images[0].mean()  # the board turns
     error = np.sqrt(np.mean((images[1] - images[0]) ** 2) / np.mean(images[0] ** 2))
@@ -163,7 +168,7 @@ def _shader_files(folder):
 
 def test_frames_repeat_bitwise(gl_context):
     """The same view drawn twice, another in between, is the same to the last bit."""
-    runtime, config = Runtime(colored_room(), context=gl_context), TunedConfig()
+    runtime, config = Runtime(colored_room(), context=gl_context), TunedConfig(light=ONE_BOUNCE)
     first = runtime.capture(room_view("spot"), config)
     runtime.capture(room_view("directional"), config)
     again = runtime.capture(room_view("spot"), config)

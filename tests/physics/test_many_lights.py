@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room
 
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.frame.rsm_resolution import (
@@ -32,7 +33,9 @@ def means(runtime, kind, count):
     """Mean direct and indirect irradiance under `count` lights in one place, each with its share."""
     light = replace(ROOM_LIGHTS[kind], intensity=ROOM_LIGHTS[kind].intensity / count)
     camera = Camera(look_at(np.array([0.0, 0.0, 2.5]), np.zeros(3)), 0.8)
-    drawn = runtime.capture(View(kind, "fitted", (64, 48), camera, (light,) * count), TunedConfig())
+    drawn = runtime.capture(
+        View(kind, "fitted", (64, 48), camera, (light,) * count), TunedConfig(light=ONE_BOUNCE)
+    )
     return np.array([drawn.direct_irradiance[drawn.valid].mean(), drawn.vpl_irradiance[drawn.valid].mean()])
 
 

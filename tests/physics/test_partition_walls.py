@@ -15,6 +15,7 @@ from partition import partitioned_rooms
 
 from examples.formulas import visibility_maps as formulas
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import CapturedFrame
 from vpltune.renderer.frame.runtime import Runtime
@@ -55,7 +56,7 @@ def test_nothing_shows_behind_a_partition(gl_context, thickness, parameters):
     scene = partitioned_rooms(thickness)
     camera = scene.cameras[0]
     runtime = Runtime(scene, context=gl_context)
-    config = TunedConfig(parameters, visibility="maps")
+    config = TunedConfig(parameters, visibility="maps", light=ONE_BOUNCE)
     far, own = (
         runtime.capture(View("room", "fitted", (48, 36), camera, (each,)), config) for each in scene.lights
     )
@@ -153,7 +154,9 @@ def test_a_room_with_a_board_stays_as_bright(gl_context, parameters):
     fewer = replace(parameters, vpl_count=256)
     scene = colored_room()
     view = room_view("spot", (48, 36))
-    captured = Runtime(scene, context=gl_context).capture(view, TunedConfig(fewer, visibility="maps"))
+    captured = Runtime(scene, context=gl_context).capture(
+        view, TunedConfig(fewer, visibility="maps", light=ONE_BOUNCE)
+    )
     traced = ray_traced_visibility(
         scene,
         captured.position_world[captured.valid].astype(np.float64),

@@ -7,6 +7,7 @@ import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
 from point_vpls import point_vpls
 
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -21,7 +22,7 @@ def runtime_with(scene, gl_context, filtering) -> Runtime:
 
 
 def config_with(**parameters) -> TunedConfig:
-    return TunedConfig(point_vpls(**parameters), quality=Quality(rsm_resolution=256))
+    return TunedConfig(point_vpls(**parameters), quality=Quality(rsm_resolution=256), light=ONE_BOUNCE)
 
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)

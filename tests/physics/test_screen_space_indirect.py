@@ -6,6 +6,7 @@ from built_scenes import ROOM_LIGHTS, colored_room, quad, room_view, scene_of
 from point_vpls import point_vpls
 from scene_paths import OWN_SCENES
 
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import CapturedFrame, read_image
@@ -26,7 +27,10 @@ STRONG = {"falloff_footprint": 2.0, "screen_space_strength": 1.0}
 def config_with(**parameters) -> TunedConfig:
     # What softening withholds has no occluders to it: neither shall what it is compared with.
     return TunedConfig(
-        point_vpls(**parameters), visibility="transmittance", quality=Quality(rsm_resolution=512)
+        point_vpls(**parameters),
+        visibility="transmittance",
+        quality=Quality(rsm_resolution=512),
+        light=ONE_BOUNCE,
     )
 
 
@@ -113,7 +117,7 @@ def test_it_gives_back_what_softening_took(gl_context):
     3 pixels a tenth of the light there is missed, which comes from within one pixel.
     """
     parameters = point_vpls(falloff_footprint=2.0, screen_space_strength=1.0, vpl_count=64)
-    config = TunedConfig(parameters, quality=Quality(rsm_resolution=256))
+    config = TunedConfig(parameters, quality=Quality(rsm_resolution=256), light=ONE_BOUNCE)
     drawn = Runtime(corner_scene(), context=gl_context).draw(corner_view(), config)
     captured = drawn.capture()
     gathered = GatherFullRsm(drawn.frame, 2).draw(drawn.inputs)
@@ -212,8 +216,8 @@ def test_contacts_come_nearer_to_the_reference(gl_context, path):
     scene = read_scene(path)
     camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
     view = View(path.stem, "fitted", (192, 144), camera, lights)
-    (reference,) = reference_views(scene, (view,), noise_target=1e-3, max_samples=1024)
-    config = TunedConfig(point_vpls(**STRONG), visibility="transmittance")
+    (reference,) = reference_views(scene, (view,), noise_target=1e-3, max_samples=1024, bounces=1)
+    config = TunedConfig(point_vpls(**STRONG), visibility="transmittance", light=ONE_BOUNCE)
     captured = Runtime(scene, context=gl_context).capture(view, config)
     near = captured.valid & contact_pixels(reference, 2.0 * mean_footprint(captured))
     truth = reference.irradiance[near]

@@ -5,6 +5,7 @@ import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, room_view
 from point_vpls import point_vpls
 
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -17,7 +18,7 @@ ALL_KINDS = ("spot", "point", "directional")
 @pytest.fixture(scope="module")
 def captured(gl_context):
     """Captures of the room by names of lights; all with one RSM resolution, so that shadows are the same."""
-    config = TunedConfig(point_vpls(vpl_count=4096), quality=Quality(rsm_resolution=256))
+    config = TunedConfig(point_vpls(vpl_count=4096), quality=Quality(rsm_resolution=256), light=ONE_BOUNCE)
     runtime = Runtime(colored_room(), context=gl_context)
     made = {}
 

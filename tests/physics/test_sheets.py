@@ -5,6 +5,7 @@ import pytest
 from built_scenes import scene_of
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -69,7 +70,7 @@ def test_a_curtain_is_dark_behind(gl_context, depth, fold, most):
     """
     runtime = Runtime(scene_of([curtain(depth, fold)], [(0.7, 0.7, 0.7)]), context=gl_context)
     lamp = Light("point", np.full(3, 2.0), np.array([-1.0, 1.2, 0.0]))
-    config = TunedConfig(ArtistParameters(), quality=Quality(interleave=1))
+    config = TunedConfig(ArtistParameters(), quality=Quality(interleave=1), light=ONE_BOUNCE)
 
     def seen_from(side: float):
         camera = Camera(look_at(np.array([2.0 * side, 1.2, 0.2]), np.array([0.0, 1.2, 0.0])), 0.9)
@@ -91,7 +92,7 @@ def test_a_lampshade_is_dark_outside(gl_context, sides):
     """
     runtime = Runtime(scene_of([tube(sides)], [(0.7, 0.7, 0.7)]), context=gl_context)
     lamp = Light("point", np.full(3, 2.0), np.array([0.0, 0.5, 0.0]))
-    config = TunedConfig(DISCS, quality=Quality(interleave=1))
+    config = TunedConfig(DISCS, quality=Quality(interleave=1), light=ONE_BOUNCE)
 
     def seen_from(position: tuple[float, float, float]):
         camera = Camera(look_at(np.array(position), np.array([0.0, 0.5, 0.0])), 0.9)

@@ -5,6 +5,7 @@ import pytest
 from room_on_ground import room_on_ground, room_view
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame import runtime as runtime_module
@@ -16,8 +17,12 @@ from vpltune.tuner.surrogate.captured_view import CapturedView
 
 WIDTHS = [200.0, 2e3, 1e4]
 """Widths of the ground in metres."""
-FEW = TunedConfig(ArtistParameters(vpl_count=64, density_importance=0.5), visibility="transmittance")
-COARSE = TunedConfig(FEW.parameters, visibility="transmittance", quality=Quality(rsm_resolution=256))
+FEW = TunedConfig(
+    ArtistParameters(vpl_count=64, density_importance=0.5), visibility="transmittance", light=ONE_BOUNCE
+)
+COARSE = TunedConfig(
+    FEW.parameters, visibility="transmittance", quality=Quality(rsm_resolution=256), light=ONE_BOUNCE
+)
 
 
 def total_flux(frame) -> float:
@@ -75,9 +80,9 @@ def test_indirect_light_is_that_of_the_reference(gl_context, width):
     """
     scene = room_on_ground(width)
     view = room_view(scene, (96, 72))
-    (reference,) = reference_views(scene, (view,), noise_target=2e-3, max_samples=1024)
+    (reference,) = reference_views(scene, (view,), noise_target=2e-3, max_samples=1024, bounces=1)
     runtime = Runtime(scene, context=gl_context)
-    frames = runtime.captures(view, TunedConfig(), ((0.0, 0.0), (0.3, 0.7), (0.6, 0.4)))
+    frames = runtime.captures(view, TunedConfig(light=ONE_BOUNCE), ((0.0, 0.0), (0.3, 0.7), (0.6, 0.4)))
     images = [CapturedView(view, reference, frame).metrics(frame.vpl_irradiance) for frame in frames]
     seen = reference.valid
     mean = np.mean([frame.vpl_irradiance[seen].mean() for frame in frames])

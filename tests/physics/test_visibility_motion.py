@@ -5,6 +5,7 @@ import pytest
 from built_scenes import colored_room, room_view
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -30,7 +31,7 @@ def poses() -> list[np.ndarray]:
 def carried(gl_context, visibility: str, size: int = Quality().map_size) -> np.ndarray:
     """Indirect irradiance, [frames, height, width, 3]; the light is a lamp that shines beside the board."""
     runtime = Runtime(colored_room(), context=gl_context)
-    config = TunedConfig(PARAMETERS, visibility=visibility, quality=Quality(map_size=size))
+    config = TunedConfig(PARAMETERS, visibility=visibility, quality=Quality(map_size=size), light=ONE_BOUNCE)
     images = []
     for placed in poses():
         runtime.scene_buffers.set_pose(placed, np.zeros((0, 4, 4)))
@@ -47,7 +48,7 @@ def test_there_is_no_lag(gl_context, with_maps):
     """The last frame of the way is bitwise the image of a runtime that never saw the frames before it."""
     runtime = Runtime(colored_room(), context=gl_context)
     runtime.scene_buffers.set_pose(poses()[-1], np.zeros((0, 4, 4)))
-    config = TunedConfig(PARAMETERS, visibility="maps")
+    config = TunedConfig(PARAMETERS, visibility="maps", light=ONE_BOUNCE)
     image = runtime.render(room_view("directional"), config, layer="irradiance")
     np.testing.assert_array_equal(image, with_maps[-1])
 

@@ -6,6 +6,7 @@ from built_scenes import quad, scene_of
 from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import CapturedFrame
 from vpltune.renderer.frame.runtime import Runtime
@@ -16,7 +17,7 @@ from vpltune.renderer.scene.views import View
 
 def captured_view(scene, gl_context, view, parameters=None) -> CapturedFrame:
     """What the runtime draws with these parameters, by default as points."""
-    config = TunedConfig(point_vpls() if parameters is None else parameters)
+    config = TunedConfig(point_vpls() if parameters is None else parameters, light=ONE_BOUNCE)
     return Runtime(scene, context=gl_context).capture(view, config)
 
 
@@ -159,7 +160,9 @@ def test_empty_scene_view_and_dark_scene(gl_context):
     camera = Camera(look_at(np.array([0.0, 1.0, 0.0]), np.zeros(3)), 0.8)
     runtime = Runtime(scene_of([floor], [(0.5, 0.5, 0.5)]), context=gl_context)
     for lights in ((), (away,)):
-        captured = runtime.capture(View("dark", "fitted", (8, 8), camera, lights), TunedConfig())
+        captured = runtime.capture(
+            View("dark", "fitted", (8, 8), camera, lights), TunedConfig(light=ONE_BOUNCE)
+        )
         assert captured.valid.all()
         assert not captured.indirect_irradiance.any()
         assert not captured.direct_irradiance.any()

@@ -6,6 +6,7 @@ from built_scenes import ROOM_LIGHTS, colored_room, room_view
 from converged_views import corner_view
 from point_vpls import point_vpls
 
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -15,7 +16,7 @@ from vpltune.renderer.scene.views import View, scaled_view
 
 
 def config_with(**parameters) -> TunedConfig:
-    return TunedConfig(point_vpls(**parameters), quality=Quality(rsm_resolution=256))
+    return TunedConfig(point_vpls(**parameters), quality=Quality(rsm_resolution=256), light=ONE_BOUNCE)
 
 
 @pytest.fixture(scope="module")

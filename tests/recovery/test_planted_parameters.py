@@ -8,6 +8,7 @@ from own_reference import own_reference
 from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.fitting.fit_placement import fit_placement
@@ -23,7 +24,7 @@ PLANTED = point_vpls(intensity=1.35, falloff_footprint=0.8, extinction_coefficie
 DISCS = ArtistParameters(intensity=1.35, extinction_coefficient=0.7, vpl_count=256)
 """The default placement, with the radius that a disc has."""
 # The parameters of visibility maps are planted in test_planted_visibility.py.
-WITHOUT_MAPS = TunedConfig(visibility="transmittance")
+WITHOUT_MAPS = TunedConfig(visibility="transmittance", light=ONE_BOUNCE)
 
 
 def drawn_by_the_runtime(runtime: Runtime, light: str, parameters: ArtistParameters) -> CapturedView:

@@ -18,7 +18,7 @@ def plain_parameters(**changes: Any) -> dict[str, Any]:
 
 
 def document(**changes: Any) -> dict[str, Any]:
-    """The shortest config file of version 2, with some keys changed or added."""
+    """The shortest config file of version 2, of one bounce, with some keys changed or added."""
     return {"format": "vpltune", "version": 2, "parameters": plain_parameters()} | changes
 
 
@@ -97,8 +97,10 @@ def any_document() -> st.SearchStrategy[dict[str, Any]]:
     parts = {
         "visibility": st.sampled_from(VISIBILITIES),
         "quality": any_quality(),
-        # One bounce is the default, and left out when it is written.
-        "light": st.fixed_dictionaries({}, optional={"bounces": st.just("all") | st.integers(2, 64)}),
+        "light": st.fixed_dictionaries(
+            {},
+            optional={"bounces": st.just("all") | st.integers(1, 64), "sky_lights": st.integers(1, 256)},
+        ),
         "fit": fit,
         "provenance": st.dictionaries(any_text(), any_text() | number, max_size=3),
     }

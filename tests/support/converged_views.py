@@ -5,6 +5,7 @@ from built_scenes import ROOM_LIGHTS
 from own_reference import own_reference
 from point_vpls import point_vpls
 
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.scene import Camera
@@ -15,7 +16,7 @@ from vpltune.tuner.surrogate.captured_view import CapturedView
 MANY = point_vpls(vpl_count=16384, falloff_footprint=0.1)
 """Whose image stands for the path tracer's: it holds all that falloff and placement can be wrong about."""
 
-DEFAULT = TunedConfig()
+DEFAULT = TunedConfig(light=ONE_BOUNCE)
 
 
 def corner_view(light: str, size=(32, 24)) -> View:

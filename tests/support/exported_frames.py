@@ -7,6 +7,7 @@ import numpy as np
 from built_scenes import colored_room
 from point_vpls import point_vpls
 
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.scene.scene import Texture
@@ -19,7 +20,9 @@ CONFIG = TunedConfig(
     ),
     visibility="transmittance",
     quality=Quality(rsm_resolution=256),
+    light=ONE_BOUNCE,
 )
+"""One bounce: exports draw no more."""
 
 
 def with_resolution(config: TunedConfig, texels: int) -> TunedConfig:

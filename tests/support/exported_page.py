@@ -9,7 +9,7 @@ from built_scenes import room_view
 from exported_frames import CONFIG
 from PIL import Image
 
-from vpltune.renderer.export.scene_bundle import left_out, scene_bundle
+from vpltune.renderer.export.scene_bundle import scene_bundle
 from vpltune.renderer.export.web_page import web_page
 from vpltune.renderer.scene.scene import Camera
 
@@ -33,4 +33,4 @@ def image_of(page):
 
 def page_text(scene, view, config=CONFIG):
     """The page of a scene in one view."""
-    return web_page(scene_bundle(scene, view, config), left_out(config, view.size))
+    return web_page(scene_bundle(scene, view, config))

@@ -121,7 +121,8 @@ def measured_cost_model(
     Args:
         scene: identifies the cached model.
         views: views at the size that is timed.
-        config: visibility, and whether importance and the near field are drawn; its VPL count is ignored.
+        config: visibility, light, and whether importance and the near field are drawn; its VPL count is
+            ignored.
         runtime: draws `scene`.
         progress: called with the share of the measurements done, in [0, 1].
 
@@ -161,7 +162,7 @@ def costs_key(renderer: str, scene: Scene, views: Sequence[View], config: TunedC
     """Hash of everything that the cost model depends on, the name of the OpenGL renderer included."""
     parts = [_FORMAT, renderer, shaders_digest(), scene_digest(scene), config.visibility]
     parts += [config.parameters.density_importance > 0.0, config.parameters.screen_space_strength > 0.0]
-    parts += [config.parameters.lloyd_iterations]
+    parts += [config.parameters.lloyd_iterations, config.light.as_dict()]
     for view in views:
         parts += [view.size, view.camera.to_world.tolist(), view.camera.yfov]
         parts += [

@@ -6,7 +6,7 @@ from vpltune.renderer.config.artist_parameters import parameter_spec
 from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS
 from vpltune.renderer.config.scene_statistics import STATISTIC_NAMES
 from vpltune.renderer.config.tuned_config import TunedConfig
-from vpltune.tuner.prior.prior_library import FITTED, HELD_OUT, VIEW_SIZE
+from vpltune.tuner.prior.prior_library import CONFIG, FITTED, HELD_OUT, VIEW_SIZE
 from vpltune.tuner.prior.prior_training import FLOOR, FOLDS, LearntPrior
 
 WORST = 8
@@ -23,7 +23,7 @@ card and the config were written by
 
 It was trained on {scenes} scenes at {counts} VPLs. The command says how many were generated
 (`tuner/prior/scene_generator.py`), and which library the others are from. Each scene has {views} views of
-{width}×{height} pixels, each with its own light position.
+{width}×{height} pixels, each with its own light position. Light was reflected {bounces}.
 
 ## On unseen scenes
 
@@ -62,6 +62,7 @@ def prior_card(learnt: "LearntPrior", config: TunedConfig, left_out: dict[str, s
         views=FITTED + HELD_OUT,
         width=VIEW_SIZE[0],
         height=VIEW_SIZE[1],
+        bounces=_times(CONFIG.light.most_bounces),
         counts=", ".join(map(str, learnt.fits.vpl_counts)),
         folds=FOLDS,
         figures=_figures(learnt),
@@ -70,6 +71,10 @@ def prior_card(learnt: "LearntPrior", config: TunedConfig, left_out: dict[str, s
         ranges=_ranges(learnt),
         left_out=_left_out(left_out),
     )
+
+
+def _times(bounces: int | None) -> str:
+    return "any number of times" if bounces is None else "once" if bounces == 1 else f"up to {bounces} times"
 
 
 def _ratio(learnt: "LearntPrior", of: str, against: str) -> np.ndarray:

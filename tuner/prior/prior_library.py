@@ -53,7 +53,7 @@ ROTATIONS = {32: _ROTATIONS, 128: _ROTATIONS[:2], 512: _ROTATIONS[:1]}
 """VPL counts, and the rotations of the point table at each. A choice: few VPLs are noisy, and the prior must
 not learn the noise of a single placement."""
 
-CAPTURE_VERSION = 8
+CAPTURE_VERSION = 9
 """Increase it whenever a code change gives other statistics or losses for the same scene. Old cache entries
 are then ignored. Runtime options, quality and the layout of the maps are in the key anyway."""
 
@@ -120,7 +120,9 @@ def prior_views(scene: Scene) -> tuple[View, ...]:
 
 def prior_references(scene: Scene, views: tuple[View, ...]) -> tuple[ReferenceView, ...]:
     """The references of these views, cached like any others."""
-    return reference_views(scene, views, noise_target=NOISE_TARGET, max_samples=MAX_SAMPLES)
+    return reference_views(
+        scene, views, noise_target=NOISE_TARGET, max_samples=MAX_SAMPLES, bounces=CONFIG.light.most_bounces
+    )
 
 
 def _captured(
@@ -165,6 +167,7 @@ def _key(scene: Scene, views: tuple[View, ...]) -> str:
         "runtime": [
             asdict(DEFAULT_OPTIONS),
             CONFIG.quality.as_dict(),
+            CONFIG.light.as_dict(),
             VisibilityMapLayout.of(CONFIG).defines,
         ],
         "axes": [[spec.low, spec.high, spec.scale] for spec in axes],

@@ -25,7 +25,7 @@ def reference_views(
     seed: int = 0,
     noise_target: float = 1e-3,
     max_samples: int = 4096,
-    bounces: int | None = 1,
+    bounces: int | None = None,
     progress: Progress | None = None,
 ) -> tuple[ReferenceView, ...]:
     """The reference of each view. Equal arguments, variant and versions give bit-identical results.
@@ -37,7 +37,8 @@ def reference_views(
         seed: Seed of the randomisation of both halves, ≥ 0.
         noise_target: Sampling stops once `noise_floor`, and that of direct light, are at most this, ≥ 0.
         max_samples: Upper limit on samples per pixel in each half, ≥ 1.
-        bounces: Reflections before light arrives at a receiver, ≥ 1; None for unlimited.
+        bounces: Reflections before light arrives at a receiver, ≥ 1; None for all. What is compared
+            with a drawn image takes `light.most_bounces` of the config that it is drawn with.
         progress: Called with the view's name and the share of the total work done, in [0, 1].
 
     Raises:

@@ -23,7 +23,8 @@ from vpltune.tuner.surrogate.vpl_visibility import map_visibility
 
 def scene_statistics(captured: CapturedFrame) -> Float64[np.ndarray, " statistics"]:
     """The statistics in the order of `STATISTIC_NAMES`, each in [0, 1]."""
-    found = {"vpl_count": np.log2(len(captured.vpl_flux)) / 16.0, "visible": 1.0}
+    count = captured.asked_vpls
+    found = {"vpl_count": np.log2(count) / 16.0, "visible": 1.0}
     if captured.vpl_flux.any():
         found |= _of_receivers(captured) | _of_lit_places(captured)
     return np.array([np.clip(found.get(name, 0.0), 0.0, 1.0) for name in STATISTIC_NAMES])
@@ -43,7 +44,7 @@ def _of_receivers(captured: CapturedFrame) -> dict[str, float]:
     cosines *= np.maximum(-(to_vpl * np.asarray(vpls.normal)[None]).sum(-1), 0.0)
     footprint = np.asarray(vpls.footprint, np.float64) ** 2
     column = np.arange(len(footprint))
-    paired = (column < VPLS) & (column % STRIDE == (index % STRIDE)[:, None])
+    paired = (column < min(captured.asked_vpls, VPLS)) & (column % STRIDE == (index % STRIDE)[:, None])
     flux = np.asarray(vpls.flux, np.float64).mean(axis=1)
     faces = paired & (cosines > 1e-4 * squared) & (flux > 0.0)
     weight = np.where(faces, flux * cosines / squared / (squared + footprint), 0.0)
@@ -78,7 +79,7 @@ def _receivers(captured: CapturedFrame) -> tuple[Int64[np.ndarray, " n"], Int64[
 
 
 def _of_lit_places(captured: CapturedFrame) -> dict[str, float]:
-    count = min(len(captured.vpl_flux), MOMENT_VPLS)
+    count = min(captured.asked_vpls, MOMENT_VPLS)
     flux = captured.vpl_flux[:count].astype(np.float64).mean(axis=1)
     lit = flux > 0.0
     if not lit.any():

@@ -96,7 +96,7 @@ def export(
 
         refuse_prior(config, to)
         assert scene is not None
-        _write_with_view(config, to, output, _bundle(config, scene, chosen_view(views, view, size, flags)))
+        _write_with_view(to, output, _bundle(config, scene, chosen_view(views, view, size, flags)))
     else:
         _write(config, to, output, scene)
     document = {
@@ -130,13 +130,14 @@ def _write(
 
     from vpltune.renderer.config.gltf_extras import write_gltf_extras
     from vpltune.renderer.config.tuned_config import config_text
-    from vpltune.renderer.export.config_export import exported
+    from vpltune.renderer.export.config_export import beyond_constants, exported
     from vpltune.renderer.files.atomic_file import written_whole
 
     if to == "gltf":
         assert scene is not None
         write_gltf_extras(scene, output, json.loads(config_text(config)))
         return
+    warn(beyond_constants(config, to))
     content = exported(config, to)
     with written_whole(output) as temporary:
         temporary.write_bytes(content)
@@ -152,15 +153,13 @@ def _bundle(config: "TunedConfig", scene: Path, chosen: "ChosenView") -> "SceneB
     return scene_bundle(loaded, drawn, config)
 
 
-def _write_with_view(config: "TunedConfig", to: Form, output: Path, bundle: "SceneBundle") -> None:
-    from vpltune.renderer.export.scene_bundle import left_out, write_bundle
+def _write_with_view(to: Form, output: Path, bundle: "SceneBundle") -> None:
+    from vpltune.renderer.export.scene_bundle import write_bundle
     from vpltune.renderer.export.web_page import web_page
     from vpltune.renderer.files.atomic_file import write_text_whole
 
-    width, height = bundle.document["view"]["size"]
-    unseen = left_out(config, (width, height), bundle.drawn_whole)
-    warn(unseen)
+    warn(bundle.left_out)
     if to == "bundle":
         write_bundle(output, bundle)
     else:
-        write_text_whole(output, web_page(bundle, unseen))
+        write_text_whole(output, web_page(bundle))

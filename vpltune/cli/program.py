@@ -52,7 +52,7 @@ CHECKOUT = Path(vpltune.__file__).resolve().parents[1]
 
 app = typer.Typer(
     name=PROGRAM,
-    help="Fits one-bounce indirect light from virtual point lights to a path tracer, and draws with it.",
+    help="Fits indirect light from virtual point lights to a path tracer, and draws with it.",
     epilog="Exit codes: 0 done, 2 bad input, 3 the machine lacks something, 4 partly done, 130 interrupted.",
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},

@@ -68,7 +68,7 @@ def _is_number(text: str) -> bool:
 
 
 def _is_default(name: str, value: object) -> bool:
-    """Whether `value` is what a config without this key has."""
+    """Whether `value` is what the default config has."""
     default = TunedConfig()
     parts = (default, default.quality, default.light)
     return next(getattr(part, name) for part in parts if hasattr(part, name)) == value

@@ -26,7 +26,7 @@ DATA_COLUMNS = 2048
 _TREE_DEPTH = 60
 """Levels of the page's tree of boxes, which is the size of a ray's stack. A choice."""
 
-NOTE = "One bounce of indirect light from virtual point lights, drawn live in this page"
+NOTE = "Indirect light from virtual point lights, drawn live in this page"
 
 _SCRIPTS = ("page.js", "frame.js", "surfaces.js", "camera.js", "values.js", "controls.js")
 _SHADERS = (
@@ -59,14 +59,14 @@ precision highp usampler2D;
 """
 
 
-def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
-    """The page, which draws in any browser with WebGL 2 and float targets; it says what is `left_out`.
+def web_page(bundle: SceneBundle) -> str:
+    """The page, which draws in any browser with WebGL 2 and float targets; it says what is left out.
 
     Raises:
         InputError: the bundle's view has no light.
     """
     if not bundle.document["lights"]:
-        raise InputError("web page: the view must have a light")
+        raise InputError("web page: the view must have a light; a page draws lamps alone")
     # One button draws the defaults, which are placed by importance even where the config is not.
     faces = bundle.document["rsm"]["faces"]
     # All orthographic faces of a light lie in its first.
@@ -85,7 +85,7 @@ def web_page(bundle: SceneBundle, left_out: tuple[str, ...] = ()) -> str:
     document = drawn | {
         "vpl_columns": VPL_COLUMNS,
         "data_columns": DATA_COLUMNS,
-        "note": ". ".join([NOTE, *left_out]) + ".",
+        "note": ". ".join([NOTE, *bundle.left_out]) + ".",
         "table": _table(),
         "arrays": arrays,
         "ray_tree": {"root": defines["RAY_ROOT"], "count_bits": COUNT_BITS},

@@ -23,12 +23,19 @@ NEAREST_PIXEL = 0.7
 class ScreenSpaceIndirectPass(FramePass):
     """G-buffer, direct irradiance, VPLs → `shared_irradiance` from nearby pixels, for the filter.
 
-    The dynamic lights' irradiance has no VPLs and is left out.
+    The dynamic lights' irradiance has no VPLs and is left out. `punctual` is the resource with direct light
+    of lamps and sky: glowing surfaces have discs, which withhold nothing.
     """
 
     name = "screen_space_indirect"
 
-    def __init__(self, resources: Resources, rsm: ReflectiveShadowMap, importance_cells: int):
+    def __init__(
+        self,
+        resources: Resources,
+        rsm: ReflectiveShadowMap,
+        importance_cells: int,
+        punctual: str = "direct_irradiance",
+    ):
         self._rsm = rsm
         target = resources.texture("vpl_irradiance")
         resources["vpl_footprint"] = resources.context.buffer(reserve=16)
@@ -51,7 +58,7 @@ class ScreenSpaceIndirectPass(FramePass):
                 *parameters,
                 "vpl_importance",
                 "gbuffer_albedo",
-                "direct_irradiance",
+                punctual if punctual == "direct_irradiance" else f"{punctual} as direct_irradiance",
                 "light_accumulation",
             ),
             writes=("emitters",),

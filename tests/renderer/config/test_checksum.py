@@ -12,7 +12,7 @@ from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.gltf_extras import write_gltf_extras
-from vpltune.renderer.config.light_settings import LightSettings
+from vpltune.renderer.config.light_settings import ONE_BOUNCE, LightSettings
 from vpltune.renderer.config.quality import MetBudget, Quality
 from vpltune.renderer.config.tuned_config import (
     FitNote,
@@ -109,7 +109,7 @@ def test_another_checksum_is_wrong(checksum):
     edited = document(checksum=checksum)
     with pytest.raises(InputError, match="key 'checksum' does not fit the values"):
         parse_config(json.dumps(edited), "text")
-    assert parse_config(json.dumps(edited), "text", check=False) == TunedConfig()
+    assert parse_config(json.dumps(edited), "text", check=False) == TunedConfig(light=ONE_BOUNCE)
 
 
 def test_a_value_out_of_range_is_refused_as_such():
@@ -146,6 +146,33 @@ def test_defaults_that_are_left_out_do_not_matter():
     assert parse_config(json.dumps(plain), "text") == TunedConfig()
 
 
+# What `vpltune fit` of version 0.2.0.dev0 wrote before there was the key `light`.
+OLDER_THAN_LIGHT = """{"format": "vpltune", "version": 2, "visibility": "maps",
+"quality": {"interleave": "auto", "map_size": 32, "map_refinement": 4, "adaptation_frames": 15.0,
+"lloyd_iterations": 2}, "parameters": {"intensity": 1.0, "falloff_footprint": 1.0,
+"extinction_coefficient": 0.0, "visibility_bias": 0.0005, "visibility_softness": 0.001, "vpl_count": 512,
+"density_exponent": 1.0, "density_importance": 0.5, "screen_space_radius": 3.0,
+"screen_space_strength": 0.0},
+"checksum": "sha256:50f82cfc85c5b8ffd50761313059a15e67e0aff6d8e76b53d1384b6c7303282f"}"""
+
+
+def test_a_file_that_is_older_than_light_has_one_bounce_and_keeps_its_checksum():
+    """Written anew it says so, and has another checksum."""
+    config = parse_config(OLDER_THAN_LIGHT, "text")
+    assert config == TunedConfig(light=ONE_BOUNCE)
+    anew = config_text(config)
+    assert json.loads(anew)["light"] == {"bounces": 1, "sky_lights": 32}
+    assert json.loads(anew)["checksum"] != json.loads(OLDER_THAN_LIGHT)["checksum"]
+    assert parse_config(anew, "text") == config
+
+
+@pytest.mark.parametrize("light", [{}, {"bounces": 1}, {"sky_lights": 32}])
+def test_one_bounce_may_be_left_out_of_a_file_that_says_it(light):
+    for written_first in (OLDER_THAN_LIGHT, config_text(TunedConfig(light=ONE_BOUNCE))):
+        edited = json.loads(written_first) | {"light": light}
+        assert parse_config(json.dumps(edited), "text") == TunedConfig(light=ONE_BOUNCE)
+
+
 def test_files_are_checked_and_renewed(tmp_path):
     path = tmp_path / "tuned.json"
     write_config(path, CONFIG)
@@ -172,7 +199,7 @@ def test_a_config_in_a_gltf_file_is_checked_too(tmp_path):
 
 def test_an_older_file_has_none_and_its_successor_has():
     config = parse_config(json.dumps(older_document()), "text")
-    points = TunedConfig(point_vpls(), quality=OLDER_QUALITY)
+    points = TunedConfig(point_vpls(), quality=OLDER_QUALITY, light=ONE_BOUNCE)
     assert written(config)["checksum"] == written(points)["checksum"]
 
 

@@ -20,6 +20,7 @@ from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.config_versions import OLDER_NAMES, brought_forward
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import (
     VERSION,
     FitNote,
@@ -35,8 +36,8 @@ def read(changed: dict) -> TunedConfig:
     return parse_config(json.dumps(changed), "older.json")
 
 
-POINTS = TunedConfig(point_vpls(), quality=OLDER_QUALITY)
-"""What version 1 drew by default: points, of which every pixel gathers all."""
+POINTS = TunedConfig(point_vpls(), quality=OLDER_QUALITY, light=ONE_BOUNCE)
+"""What version 1 drew by default: points, of which every pixel gathers all, and one bounce."""
 
 
 def test_the_shortest_older_file_is_the_default_of_version_1():
@@ -82,7 +83,7 @@ def test_every_older_file_is_read_and_written_as_version_2(values, visibility):
         older[before] = older.pop(now)
     config = read(older_document(parameters=older, visibility=visibility))
     assert config == TunedConfig(
-        ArtistParameters.validated(values), visibility=visibility, quality=OLDER_QUALITY
+        ArtistParameters.validated(values), visibility=visibility, quality=OLDER_QUALITY, light=ONE_BOUNCE
     )
     text = config_text(config)
     assert json.loads(text)["version"] == VERSION == 2

@@ -13,6 +13,7 @@ from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.gltf_extras import EXTRAS_KEY, read_gltf_extras, write_gltf_extras
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig, config_text, read_config
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.files import read_scene
@@ -114,8 +115,8 @@ def test_a_scene_without_a_config_and_one_with_a_bad_one(tmp_path):
 
 def test_an_older_config_in_a_scene_is_read(tmp_path):
     write_gltf_extras(SCENES / "cornell-box.glb", tmp_path / "older.glb", older_document(visibility="none"))
-    points = TunedConfig(point_vpls(), visibility="transmittance", quality=OLDER_QUALITY)
-    assert read_config(tmp_path / "older.glb") == points
+    older = {"visibility": "transmittance", "quality": OLDER_QUALITY, "light": ONE_BOUNCE}
+    assert read_config(tmp_path / "older.glb") == TunedConfig(point_vpls(), **older)
 
 
 def _gltf_triangle(folder):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
 from vpltune.renderer.config.config_schema import config_schema
-from vpltune.renderer.config.light_settings import LightSettings
+from vpltune.renderer.config.light_settings import ONE_BOUNCE, LightSettings
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import (
     FitNote,
@@ -51,10 +51,14 @@ def test_default_is_the_tables_defaults():
 
 
 def test_the_shortest_file_is_the_default():
-    """Everything but the parameters may be left out, and so may every member of the quality part."""
+    """Everything but the parameters may be left out, and so may every member of the quality part.
+
+    But for the light: a file that says nothing of it is of one bounce.
+    """
     SCHEMA.validate(document())
-    assert parse_config(json.dumps(document()), "text") == TunedConfig()
-    assert parse_config(json.dumps(document(quality={})), "text") == TunedConfig()
+    default = TunedConfig(light=ONE_BOUNCE)
+    assert parse_config(json.dumps(document()), "text") == default
+    assert parse_config(json.dumps(document(quality={}, light={})), "text") == default
 
 
 def test_a_config_goes_through_a_file(tmp_path):
@@ -89,9 +93,22 @@ def test_bounces_are_read_and_written(bounces):
     assert parse_config(config_text(config), "text").light == config.light
 
 
-def test_an_empty_light_or_provenance_is_not_written():
-    config = parse_config(json.dumps(document(light={}, provenance={})), "text")
-    assert not {"light", "provenance", "fit", "auto"} & set(json.loads(config_text(config)))
+@pytest.mark.parametrize("name", ["default", "auto"])
+def test_presets_have_all_bounces(name):
+    assert read_config(name).light == LightSettings("all") == LightSettings()
+
+
+@pytest.mark.parametrize("light", [None, {}, {"sky_lights": 8}])
+def test_a_file_that_says_no_bounces_has_one(light):
+    said = {} if light is None else {"light": light}
+    assert parse_config(json.dumps(document(**said)), "text").light.bounces == 1
+
+
+def test_the_light_is_always_written_and_an_empty_provenance_is_not():
+    config = parse_config(json.dumps(document(provenance={})), "text")
+    written = json.loads(config_text(config))
+    assert written["light"] == {"bounces": 1, "sky_lights": 32}
+    assert not {"provenance", "fit", "auto"} & set(written)
 
 
 @pytest.mark.parametrize(

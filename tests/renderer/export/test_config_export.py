@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 
 from vpltune.renderer.config.artist_parameters import ARTIST_PARAMETERS, ArtistParameters
+from vpltune.renderer.config.light_settings import LightSettings
 from vpltune.renderer.config.parameter_block import pack_parameters, unpack_parameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import VISIBILITIES, TunedConfig, parse_config
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.export.config_export import (
     VISIBILITY_CODES,
+    beyond_constants,
     c_header,
     constant_name,
     exported,
@@ -97,12 +99,25 @@ def test_codes_of_the_visibility_are_those_that_shaders_were_written_for():
 def test_the_quality_settings_are_constants_too(quality, expected):
     """Interleaving or a resolution of 0 leaves it to who reads it."""
     config = TunedConfig(quality=quality)
+    expected = {"BOUNCES": 0, **expected}
     for text, pattern in (
         (glsl_constants(config), r"^const int VPL_(\w+) = (\d+);$"),
         (c_header(config), r"^#define VPL_(\w+) (\d+)$"),
     ):
         found = {name: int(value) for name, value in re.findall(pattern, text, re.MULTILINE)}
         assert found == expected
+
+
+@pytest.mark.parametrize(("bounces", "words"), [(1, None), (3, "3 bounces"), ("all", "all bounces")])
+def test_bounces_are_a_constant_and_more_than_one_is_said(bounces, words):
+    """An engine that draws the first bounce alone has less light than the parameters were tuned to."""
+    config = TunedConfig(light=LightSettings(bounces))
+    for text, form in ((glsl_constants(config), "glsl"), (c_header(config), "c")):
+        assert f"VPL_BOUNCES {'= ' * (form == 'glsl')}{0 if bounces == 'all' else bounces}" in text
+        said = beyond_constants(config, form)
+        assert len(said) == (words is not None)
+        assert all(words in sentence and sentence in text for sentence in said)
+    assert beyond_constants(config, "json") == ()
 
 
 def test_std140_bytes_are_the_parameter_block():

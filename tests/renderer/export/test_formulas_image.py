@@ -24,6 +24,7 @@ from examples.formulas.vpl_gather import gather
 from examples.formulas.vpl_importance import importance_cells, importance_factor
 from vpltune import Runtime, TunedConfig, View
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.scene.scene import Camera
 from vpltune.renderer.scene.transforms import look_at
@@ -175,6 +176,7 @@ def test_an_image_by_formulas_is_the_runtimes(gl_context, parameters, visibility
         parameters,
         visibility=visibility,
         quality=Quality(rsm_resolution=RESOLUTION, map_size=8, map_refinement=2),
+        light=ONE_BOUNCE,
     )
     captured = Runtime(boxes(), context=gl_context).capture(view(), config)
     drawn = captured.vpl_irradiance[captured.valid].astype(np.float64)

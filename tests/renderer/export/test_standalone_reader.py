@@ -14,9 +14,11 @@ from PIL import Image
 from vpltune import Runtime
 from vpltune.cli.program import run
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE, LightSettings
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, parse_config
 from vpltune.renderer.export.scene_bundle import left_out, scene_bundle, write_bundle
+from vpltune.renderer.scene.environment import even_sky
 from vpltune.renderer.scene.transforms import look_at
 from vpltune.tuner.fitting.fit_density import DISC_FOOTPRINT
 
@@ -85,7 +87,7 @@ def test_nothing_lit_or_nothing_seen_is_black(tmp_path, turned):
         CONFIG.parameters, vpl_count=8, density_importance=0.7, lloyd_iterations=2
     )
     scene, view = colored_room(), room_view("spot", (32, 24))
-    config = with_resolution(TunedConfig(parameters, visibility="maps"), 64)
+    config = with_resolution(TunedConfig(parameters, visibility="maps", light=ONE_BOUNCE), 64)
     # Beyond all walls, and on outwards.
     outside = look_at(np.array([0.0, 0.0, 1e3]), np.array([0.0, 0.0, 2e3]))
     if turned == "light":
@@ -189,14 +191,46 @@ def test_what_is_left_out_is_said():
     """Interleaving, where the runtime interleaves an image of that size, and the near field of points."""
     small, large = (96, 72), (640, 480)
     interleaved = "Every pixel gathers every VPL here; only the runtime interleaves them"
-    assert left_out(TunedConfig(), small) == ()
-    assert left_out(TunedConfig(), large) == (interleaved,)
-    assert left_out(TunedConfig(quality=Quality(interleave=4)), small) == (interleaved,)
-    assert left_out(TunedConfig(quality=Quality(interleave=1)), large) == ()
-    near_field = with_parameters(TunedConfig(), screen_space_strength=1.0, lloyd_iterations=0)
+    plain = TunedConfig(light=ONE_BOUNCE)
+    assert left_out(plain, small) == ()
+    assert left_out(plain, large) == (interleaved,)
+    assert left_out(dataclasses.replace(plain, quality=Quality(interleave=4)), small) == (interleaved,)
+    assert left_out(dataclasses.replace(plain, quality=Quality(interleave=1)), large) == ()
+    near_field = with_parameters(plain, screen_space_strength=1.0, lloyd_iterations=0)
     assert left_out(near_field, small) == ("The screen-space near field is drawn by the runtime alone",)
     # Discs withhold nothing that a near field would give back.
     assert left_out(with_parameters(near_field, lloyd_iterations=8), small) == ()
+
+
+@pytest.mark.parametrize(
+    ("bounces", "glows", "sky", "missing"),
+    [
+        (1, False, False, None),
+        ("all", False, False, "light that is reflected more than once is"),
+        (2, True, False, "light that is reflected more than once and light of glowing surfaces is"),
+        (1, True, True, "light of glowing surfaces and light of the sky is"),
+    ],
+)
+def test_light_that_is_left_out_is_named_in_the_bundle(bounces, glows, sky, missing):
+    scene = colored_room()
+    if glows:
+        walls = tuple(dataclasses.replace(each, emission=(1.0, 1.0, 1.0)) for each in scene.materials)
+        scene = dataclasses.replace(scene, materials=walls)
+    if sky:
+        scene = dataclasses.replace(scene, environment=even_sky((1.0, 1.0, 1.0)))
+    bundle = scene_bundle(
+        scene, room_view("spot", (16, 12)), dataclasses.replace(CONFIG, light=LightSettings(bounces))
+    )
+    said = [] if missing is None else [f"Only the first bounce of lamps is drawn here: {missing} left out"]
+    assert bundle.document["left_out"] == list(bundle.left_out) == said
+
+
+def test_the_command_warns_in_one_line_of_what_its_file_names(tmp_path, capfd):
+    arguments = ["export", "default", "--to", "bundle", "--scene", str(SCENES / "cornell-box.glb")]
+    assert run([*arguments, "--size", "16x12", "-o", str(tmp_path / "out")]) == 0
+    (line,) = capfd.readouterr().err.strip().splitlines()
+    (sentence,) = json.loads((tmp_path / "out" / "bundle.json").read_text())["left_out"]
+    assert sentence in line and "reflected more than once" in sentence
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from made_priors import made_prior
 from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -339,7 +340,10 @@ def everything() -> tuple[View, TunedConfig, DynamicLights]:
     lights = DynamicLights(point_lights(np.zeros((4, 3)), np.full(3, 0.05), 0.5))
     parameters = point_vpls(vpl_count=64, density_importance=0.5, screen_space_strength=1.0)
     config = TunedConfig(
-        parameters, auto=made_prior(), quality=Quality(interleave=4, map_size=8, rsm_resolution=64)
+        parameters,
+        auto=made_prior(),
+        quality=Quality(interleave=4, map_size=8, rsm_resolution=64),
+        light=ONE_BOUNCE,
     )
     return View("all", view.split, view.size, view.camera, tuple(ROOM_LIGHTS.values())), config, lights
 
@@ -369,7 +373,7 @@ def test_every_resource_has_a_place_of_its_own_and_drivers_have_enough(gl_contex
     view, config, lights = everything()
     runtime.draw(view, config, lights=lights).read_statistics()
     discs = ArtistParameters(vpl_count=64, lloyd_iterations=1)
-    runtime.draw(view, TunedConfig(discs, quality=config.quality))
+    runtime.draw(view, TunedConfig(discs, quality=config.quality, light=ONE_BOUNCE))
     assert len({each.shader for each in declared}) > 25
     for each in declared:
         assert sorted(each.units.values()) == list(range(len(each.units))), each.shader

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from built_scenes import colored_room, room_view
 
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.srgb import linear_from_srgb
@@ -37,7 +38,7 @@ def test_an_image_is_that_of_the_scene_the_arrays_come_from(gl_context):
     room = colored_room()
     views = room_view(size=(48, 36))
     images = [
-        Runtime(scene, context=gl_context).render(views, TunedConfig()).astype(int)
+        Runtime(scene, context=gl_context).render(views, TunedConfig(light=ONE_BOUNCE)).astype(int)
         for scene in (room, scene_from_arrays(**as_arrays(room)))
     ]
     assert images[0].std() > 10.0
@@ -82,7 +83,7 @@ def test_the_top_row_of_a_texture_is_at_v_zero(gl_context):
     scene = scene_from_arrays(SQUARE, HALVES, uv=uv, texture=texels)
     camera = Camera(look_at([0.5, 0.5, 1.0], [0.5, 0.5, 0.0]), 2.0 * np.arctan(0.4))
     view = View("front", "fitted", (32, 32), camera, ())
-    albedo = Runtime(scene, context=gl_context).render(view, TunedConfig(), layer="albedo")
+    albedo = Runtime(scene, context=gl_context).render(view, TunedConfig(light=ONE_BOUNCE), layer="albedo")
     level = float(linear_from_srgb(np.float32([188 / 255.0]))[0])
     np.testing.assert_allclose(albedo[:14], np.broadcast_to((level, 0.0, 0.0), (14, 32, 3)), atol=0.01)
     np.testing.assert_allclose(albedo[18:], np.broadcast_to((0.0, 0.0, level), (14, 32, 3)), atol=0.01)

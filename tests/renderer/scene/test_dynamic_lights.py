@@ -8,6 +8,7 @@ import pytest
 from built_scenes import colored_room, quad, room_view, scene_of
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import read_image
@@ -34,7 +35,7 @@ from vpltune.renderer.scene.views import View, scaled_view
 from vpltune.renderer.techniques.light_per_draw import LightPerDrawPass
 
 WAYS = (LightPerDrawPass, LightVolumesPass, TiledLightsPass)
-CONFIG = TunedConfig()
+CONFIG = TunedConfig(light=ONE_BOUNCE)
 SIZE = (136, 72)
 """Not a whole number of tiles, and more than one cell."""
 
@@ -43,7 +44,9 @@ class Lighting:
     """A G-buffer and the three passes that can light it."""
 
     def __init__(self, context, scene, view):
-        config = TunedConfig(ArtistParameters(vpl_count=1), quality=Quality(rsm_resolution=64))
+        config = TunedConfig(
+            ArtistParameters(vpl_count=1), quality=Quality(rsm_resolution=64), light=ONE_BOUNCE
+        )
         drawn = Runtime(scene, context=context).draw(view, config)
         self.captured, self.inputs = drawn.capture(), drawn.inputs
         self.resources = drawn.frame.resources.child()

@@ -12,6 +12,7 @@ from PIL import Image
 from vpltune import Runtime
 from vpltune.cli.program import run
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import InputError
@@ -106,7 +107,7 @@ def test_mitsuba_sees_the_same_surfaces_and_colours(tmp_path, version):
     scene = read_scene(tmp_path / "scene.glb")
     view = View("main", "fitted", SIZE, scene.cameras[0], ())
     runtime = Runtime(scene)
-    config = TunedConfig(ArtistParameters(vpl_count=1), quality=Quality(rsm_resolution=64))
+    config = TunedConfig(ArtistParameters(vpl_count=1), quality=Quality(rsm_resolution=64), light=ONE_BOUNCE)
     depth, albedo, normal = (
         runtime.render(view, config, layer=layer) for layer in ("depth", "albedo", "normal")
     )

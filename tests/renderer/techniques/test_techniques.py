@@ -5,6 +5,7 @@ import pytest
 from built_scenes import ROOM_LIGHTS, colored_room, quad, scene_of
 from point_vpls import point_vpls
 
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import read_image
@@ -28,7 +29,10 @@ class Drawn:
     def __init__(self, context, scene: Scene, view: View, rsm_resolution: int = 256):
         self.scene, self.view = scene, view
         self._config = TunedConfig(
-            PARAMETERS, visibility="transmittance", quality=Quality(rsm_resolution=rsm_resolution)
+            PARAMETERS,
+            visibility="transmittance",
+            quality=Quality(rsm_resolution=rsm_resolution),
+            light=ONE_BOUNCE,
         )
         self._runtime = Runtime(scene, context=context)
         drawn = self._runtime.draw(view, self._config)

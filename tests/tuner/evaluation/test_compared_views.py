@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.tuner.evaluation.evaluate import EvaluatedView, Evaluation
 from vpltune.tuner.metrics.view_metrics import ViewMetrics
@@ -19,7 +20,9 @@ def evaluated(ratio, default=1.0):
         name: ViewMetrics(default * factor, default * factor, 0.0, 0.0, 1.0, 0.0)
         for name, factor in (("default", 1.0), ("tuned", ratio), ("ceiling", 1.0))
     }
-    return EvaluatedView(CapturedView.__new__(CapturedView), TunedConfig(), images, errors, 0.0)
+    return EvaluatedView(
+        CapturedView.__new__(CapturedView), TunedConfig(light=ONE_BOUNCE), images, errors, 0.0
+    )
 
 
 @pytest.mark.parametrize(

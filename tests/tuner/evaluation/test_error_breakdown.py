@@ -7,6 +7,7 @@ import pytest
 
 from vpltune import configs
 from vpltune.cli.metrics_table import error_breakdown_table
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 
 CORNELL = Path(configs.__file__).parent / "scenes" / "cornell-box.glb"
 
@@ -20,7 +21,7 @@ def budgets(tmp_path_factory):
 
     found = {}
     for visibility in ("transmittance", "maps"):
-        tuned = TunedConfig(ArtistParameters(vpl_count=64)).seen_by(visibility)
+        tuned = TunedConfig(ArtistParameters(vpl_count=64), light=ONE_BOUNCE).seen_by(visibility)
         options = EvaluateOptions(views=1, size=(48, 36), tuned=tuned, split_error=True)
         found[visibility] = evaluate_scene(CORNELL, options, lambda stage, share: None).document
     return found

@@ -8,6 +8,7 @@ from built_scenes import colored_room, room_view
 from own_reference import own_reference
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -17,7 +18,7 @@ from vpltune.tuner.evaluation.evidence import doubts, undetermined
 from vpltune.tuner.fitting.uncertainty import Interval
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
-FEW = TunedConfig(ArtistParameters(vpl_count=16), quality=Quality(rsm_resolution=128))
+FEW = TunedConfig(ArtistParameters(vpl_count=16), quality=Quality(rsm_resolution=128), light=ONE_BOUNCE)
 
 
 @pytest.fixture(scope="module")

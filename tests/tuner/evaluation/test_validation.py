@@ -8,6 +8,7 @@ from built_scenes import colored_room
 from converged_views import converged_view
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -16,7 +17,9 @@ from vpltune.tuner.evaluation.validation import validation_metrics
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
 START = TunedConfig(
-    ArtistParameters(vpl_count=64), quality=Quality(interleave=2, map_size=8, rsm_resolution=128)
+    ArtistParameters(vpl_count=64),
+    quality=Quality(interleave=2, map_size=8, rsm_resolution=128),
+    light=ONE_BOUNCE,
 )
 ROTATIONS = ((0.0, 0.0), (0.3, 0.6))
 

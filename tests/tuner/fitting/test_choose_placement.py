@@ -9,6 +9,7 @@ from converged_views import converged_view
 from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import LARGEST_DISC_COUNT, ArtistParameters, placement
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -18,7 +19,7 @@ from vpltune.tuner.fitting.fit_views import robust_errors
 from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
 
 START = point_vpls(vpl_count=64)
-CONFIG = TunedConfig(START, quality=Quality(rsm_resolution=128))
+CONFIG = TunedConfig(START, quality=Quality(rsm_resolution=128), light=ONE_BOUNCE)
 
 
 @pytest.mark.slow

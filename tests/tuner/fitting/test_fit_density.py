@@ -8,6 +8,7 @@ from converged_views import MANY, converged_view
 from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -20,7 +21,7 @@ from vpltune.tuner.fitting.fit_density import (
 from vpltune.tuner.fitting.fit_status import FitStatus
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
-FEW = TunedConfig(point_vpls(vpl_count=24), quality=Quality(rsm_resolution=128))
+FEW = TunedConfig(point_vpls(vpl_count=24), quality=Quality(rsm_resolution=128), light=ONE_BOUNCE)
 
 
 @pytest.fixture(scope="module")

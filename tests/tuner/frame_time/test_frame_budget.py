@@ -12,6 +12,7 @@ from steady_clock import pass_times, steady_clock
 from vpltune.cli.budget_flags import budget_from_flags, with_vpl_count
 from vpltune.cli.fit import _report
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import MetBudget, Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, read_config
 from vpltune.renderer.errors import InputError
@@ -23,7 +24,7 @@ from vpltune.tuner.frame_time.cost_model import CostModel, PassCost, measured_co
 from vpltune.tuner.frame_time.fit_budget import BudgetOptions, fit_to_budget
 from vpltune.tuner.frame_time.frame_budget import FrameBudget
 
-START = TunedConfig(visibility="transmittance")
+START = TunedConfig(visibility="transmittance", light=ONE_BOUNCE)
 
 
 @pytest.fixture
@@ -136,7 +137,7 @@ def test_flags():
     """A budget chooses the count itself; a frame's size needs a budget; numbers must be numbers."""
     assert budget_from_flags(None, None, False, None) is None
     assert budget_from_flags(None, 2.0, False, "64x48") == BudgetOptions(2.0, False, (64, 48))
-    assert with_vpl_count(TunedConfig(), 32).parameters.vpl_count == 32
+    assert with_vpl_count(TunedConfig(light=ONE_BOUNCE), 32).parameters.vpl_count == 32
     with pytest.raises(InputError, match="--frame-size: needs"):
         budget_from_flags(None, None, False, "64x48")
     with pytest.raises(InputError, match="--vpl-count: a budget"):

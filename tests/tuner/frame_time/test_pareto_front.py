@@ -9,6 +9,7 @@ import pytest
 
 from vpltune.cli.budget_flags import budget_lines
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import MetBudget, Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, read_config
 from vpltune.renderer.errors import InputError
@@ -150,7 +151,7 @@ def test_budgets_that_are_not_met_are_left_out_unless_none_is():
 def test_a_front_that_is_written_replaces_the_one_before(tmp_path):
     """Configs, table and plot; none of a longer front that was there stays."""
     points = fit_front(PlantedBudget())
-    start = TunedConfig(visibility="maps")
+    start = TunedConfig(visibility="maps", light=ONE_BOUNCE)
     write_front(tmp_path, points, start, (64, 48))
     rows = write_front(tmp_path, points[:2], start, (64, 48))
     written = sorted(Path(tmp_path / "pareto").iterdir())

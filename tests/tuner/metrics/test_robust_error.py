@@ -8,6 +8,7 @@ from built_scenes import colored_room, room_view
 from own_reference import own_reference
 from point_vpls import point_vpls
 
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.fitting.fit_placement import fit_placement
@@ -79,7 +80,7 @@ def test_pixels_that_no_parameter_can_mend_do_not_rule_a_fit(gl_context):
     ten times as hard.
     """
     runtime = Runtime(colored_room(), context=gl_context)
-    planted = TunedConfig(PLANTED, visibility="transmittance")
+    planted = TunedConfig(PLANTED, visibility="transmittance", light=ONE_BOUNCE)
     view = room_view("spot")
     captured = runtime.capture(view, planted)
     reference = own_reference(captured)

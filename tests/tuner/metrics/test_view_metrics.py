@@ -8,6 +8,7 @@ import pytest
 from built_scenes import colored_room, room_view
 from own_reference import own_reference
 
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -66,7 +67,7 @@ def test_flip_compares_light_and_not_textures(gl_context):
     """FLIP is 0 if the light is the same and only the reference's albedo differs, as by texture filtering."""
     runtime = Runtime(colored_room(), context=gl_context)
     view = room_view("spot")
-    captured = runtime.capture(view, TunedConfig(quality=Quality(rsm_resolution=128)))
+    captured = runtime.capture(view, TunedConfig(quality=Quality(rsm_resolution=128), light=ONE_BOUNCE))
     noise = np.random.default_rng(0).uniform(0.2, 1.0, captured.albedo.shape).astype(np.float32)
     seen = CapturedView(view, replace(own_reference(captured), albedo=noise), captured)
     assert seen.metrics(captured.indirect_irradiance).flip < 1e-6

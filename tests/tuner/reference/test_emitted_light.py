@@ -16,7 +16,9 @@ RADIANCE = np.array([3.0, 2.0, 1.0])
 
 
 def reference(scene, view, **changes) -> ReferenceView:
-    return reference_views(scene, (view,), **{"noise_target": 0.0, "max_samples": 64} | changes)[0]
+    return reference_views(
+        scene, (view,), **{"noise_target": 0.0, "max_samples": 64, "bounces": 1} | changes
+    )[0]
 
 
 def lamp(radiance=RADIANCE, reflectance=0.0, **changes) -> Material:

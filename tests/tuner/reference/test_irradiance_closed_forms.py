@@ -18,7 +18,9 @@ def floor(shapes):
 
 
 def reference(scene, view, **changes) -> ReferenceView:
-    return reference_views(scene, (view,), **{"noise_target": 0.0, "max_samples": 64} | changes)[0]
+    return reference_views(
+        scene, (view,), **{"noise_target": 0.0, "max_samples": 64, "bounces": 1} | changes
+    )[0]
 
 
 def test_direct_point_light_is_inverse_square(shapes, floor):

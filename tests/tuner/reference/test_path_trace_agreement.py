@@ -23,7 +23,7 @@ def z_scores(mitsuba, shapes, scene: Scene, view: View, rounds: int):
     With thousands of samples the mean of a pixel is close enough to normal for a test this far out in the
     tail. With 500, pixels that see a small bright patch fail because of their skewness alone.
     """
-    ours = reference_views(scene, (view,), noise_target=0.0, max_samples=2048)[0]
+    ours = reference_views(scene, (view,), noise_target=0.0, max_samples=2048, bounces=1)[0]
     valid = ours.valid
     plain, variance = np.zeros((2, valid.sum(), 3))
     for seed in range(rounds):

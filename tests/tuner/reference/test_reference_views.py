@@ -36,7 +36,9 @@ def test_same_seed_same_bits_and_another_seed_others(shapes, monkeypatch, tmp_pa
     made = []
     for run, seed in enumerate((5, 5, 6)):
         no_cache(monkeypatch, tmp_path / str(run))
-        made.append(reference_views(scene, (view,), seed=seed, noise_target=0.0, max_samples=64)[0])
+        made.append(
+            reference_views(scene, (view,), seed=seed, noise_target=0.0, max_samples=64, bounces=1)[0]
+        )
     assert same(made[0], made[1])
     assert not np.array_equal(made[0].irradiance_a, made[2].irradiance_a)
     assert np.array_equal(made[0].direct_irradiance, made[2].direct_irradiance)
@@ -45,25 +47,25 @@ def test_same_seed_same_bits_and_another_seed_others(shapes, monkeypatch, tmp_pa
 def test_sampling_stops_at_the_noise_target(shapes):
     scene, view = shapes.box_room(), shapes.box_room_view()
     by_target = {
-        target: reference_views(scene, (view,), noise_target=target, max_samples=2048)[0]
+        target: reference_views(scene, (view,), noise_target=target, max_samples=2048, bounces=1)[0]
         for target in (1e-2, 1e-3)
     }
     assert by_target[1e-2].samples < by_target[1e-3].samples
     for target, got in by_target.items():
         assert noise_floor(got) <= target
-    capped = reference_views(scene, (view,), noise_target=0.0, max_samples=100)[0]
+    capped = reference_views(scene, (view,), noise_target=0.0, max_samples=100, bounces=1)[0]
     assert capped.samples == 100
 
 
 def test_noise_floor_is_the_error_of_the_mean(shapes):
     """The relMSE against a reference with far more samples matches the prediction from the two halves."""
     scene, view = shapes.box_room(), shapes.box_room_view()
-    truth = reference_views(scene, (view,), seed=1, noise_target=0.0, max_samples=4096)[0]
+    truth = reference_views(scene, (view,), seed=1, noise_target=0.0, max_samples=4096, bounces=1)[0]
     valid = truth.valid
     scale = truth.irradiance[valid] ** 2 + 0.01 * truth.irradiance[valid].mean() ** 2
     measured, foretold = [], []
     for seed in range(2, 10):
-        got = reference_views(scene, (view,), seed=seed, noise_target=0.0, max_samples=32)[0]
+        got = reference_views(scene, (view,), seed=seed, noise_target=0.0, max_samples=32, bounces=1)[0]
         measured.append(np.mean((got.irradiance - truth.irradiance)[valid] ** 2 / scale))
         foretold.append(noise_floor(got))
     # Means over eight seeds and 500 pixels; each scatters by some 10 %.
@@ -73,10 +75,10 @@ def test_noise_floor_is_the_error_of_the_mean(shapes):
 def test_halves_are_independent(shapes):
     """The errors of both halves are uncorrelated over pixels and seeds."""
     scene, view = shapes.box_room(), shapes.box_room_view((16, 12))
-    truth = reference_views(scene, (view,), seed=1, noise_target=0.0, max_samples=4096)[0]
+    truth = reference_views(scene, (view,), seed=1, noise_target=0.0, max_samples=4096, bounces=1)[0]
     errors = []
     for seed in range(2, 12):
-        got = reference_views(scene, (view,), seed=seed, noise_target=0.0, max_samples=16)[0]
+        got = reference_views(scene, (view,), seed=seed, noise_target=0.0, max_samples=16, bounces=1)[0]
         errors.append(
             [(half - truth.irradiance)[truth.valid][:, 1] for half in (got.irradiance_a, got.irradiance_b)]
         )
@@ -88,9 +90,9 @@ def test_halves_are_independent(shapes):
 @pytest.mark.parametrize("factor", [0.01, 0.1, 10.0, 100.0])
 def test_scale_changes_nothing(shapes, factor):
     scene, view = shapes.box_room(), shapes.box_room_view()
-    base = reference_views(scene, (view,), noise_target=0.0, max_samples=64)[0]
+    base = reference_views(scene, (view,), noise_target=0.0, max_samples=64, bounces=1)[0]
     other = reference_views(
-        scaled(scene, factor), (scaled_view(view, factor),), noise_target=0.0, max_samples=64
+        scaled(scene, factor), (scaled_view(view, factor),), noise_target=0.0, max_samples=64, bounces=1
     )[0]
     assert np.array_equal(base.valid, other.valid)
     # The rays are the same up to rounding in the last place, which lets a sample or two miss an edge.
@@ -195,7 +197,7 @@ def test_a_folder_that_cannot_be_written_is_no_error(shapes, monkeypatch, tmp_pa
     (tmp_path / "file").write_text("in the way")
     no_cache(monkeypatch, tmp_path / "file")
     scene, view = shapes.box_room(), shapes.box_room_view((8, 6))
-    assert reference_views(scene, (view,), noise_target=0.0, max_samples=16)[0].samples == 16
+    assert reference_views(scene, (view,), noise_target=0.0, max_samples=16, bounces=1)[0].samples == 16
     assert "not cached" in caplog.text
 
 
@@ -204,10 +206,10 @@ def test_old_entries_go_when_the_cache_is_full(shapes, monkeypatch, tmp_path):
     scene = shapes.box_room()
     views = [shapes.box_room_view((8, 6 + k)) for k in range(3)]
     for view in views:
-        reference_views(scene, (view,), noise_target=0.0, max_samples=1)
+        reference_views(scene, (view,), noise_target=0.0, max_samples=1, bounces=1)
     sizes = [path.stat().st_size for path in (tmp_path / "references").iterdir()]
     monkeypatch.setattr(cache, "SIZE_LIMIT", max(sizes) * 2)
-    reference_views(scene, (shapes.box_room_view((8, 5)),), noise_target=0.0, max_samples=1)
+    reference_views(scene, (shapes.box_room_view((8, 5)),), noise_target=0.0, max_samples=1, bounces=1)
     assert len(list((tmp_path / "references").iterdir())) <= 2
 
 
@@ -367,6 +369,6 @@ def test_a_cache_that_cannot_be_written_to_stops_nothing(shapes, monkeypatch, tm
     with pytest.raises(MachineError), written_whole(tmp_path / "x"):
         pass
     scene, view = shapes.box_room(), shapes.box_room_view()
-    assert reference_views(scene, (view,), noise_target=0.0, max_samples=16)[0].samples == 16
+    assert reference_views(scene, (view,), noise_target=0.0, max_samples=16, bounces=1)[0].samples == 16
     assert "reference not cached" in caplog.text
     assert os.strerror(reason) in caplog.text

@@ -9,12 +9,13 @@ from made_priors import made_prior
 from own_reference import own_reference
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views, runtime_irradiance
 
-CONFIG = TunedConfig(ArtistParameters(vpl_count=64), quality=Quality(rsm_resolution=128))
+CONFIG = TunedConfig(ArtistParameters(vpl_count=64), quality=Quality(rsm_resolution=128), light=ONE_BOUNCE)
 
 
 @pytest.fixture(scope="module")

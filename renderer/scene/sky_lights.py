@@ -18,11 +18,14 @@ texels."""
 _ITERATIONS = 8
 """Lloyd iterations. A choice: the parts of an even sky then differ in size by less than a tenth."""
 
+_NARROWEST = 0.1
+"""Angle in radians between parts that are joined: a sun is one light. A choice, 5.7°; 256 even parts are 13°
+apart."""
 _BELOW = 0.25
 """What light from below the horizon counts for when the sky is cut: most scenes have a ground that hides it.
 A choice: a fifth of the lights of an even sky are there."""
-_AXES_COUNT = 100.0
-"""How much more the six axes count, along which most floors and walls lie. A choice."""
+_AXES_COUNT = 30.0
+"""How much more surfaces along the six axes count, as most floors and walls are. A choice."""
 _ORIENTATIONS = 400
 """Orientations of surfaces whose irradiance is put right. A choice: 10° apart."""
 _RIDGE = 1e-3
@@ -49,12 +52,25 @@ def sky_lights(environment: Environment, count: int) -> tuple[Light, ...]:
     for _ in range(_ITERATIONS):
         middles = _middles(directions, power, owner)
         owner = np.unique((directions @ middles.T).argmax(axis=1), return_inverse=True)[1]
+    owner = _joined(_middles(directions, power, owner), np.bincount(owner, power))[owner]
     middles = _middles(directions, power, owner)
     weights = _weights(directions, power, middles, np.bincount(owner, power))
     return tuple(
         Light("directional", weight * flux[owner == i].sum(axis=0), direction_world=-middle, name="sky")
         for i, (weight, middle) in enumerate(zip(weights, middles, strict=True))
     )
+
+
+def _joined(middles: Float64[np.ndarray, "parts 3"], powers: Float64[np.ndarray, " parts"]) -> np.ndarray:
+    """For each part the new number: the cut may have halved a sun, whose parts become one again."""
+    kept: list[int] = []
+    number = np.zeros(len(powers), np.int64)
+    for part in np.argsort(-powers, kind="stable"):
+        near = [k for k, other in enumerate(kept) if middles[other] @ middles[part] > np.cos(_NARROWEST)]
+        if not near:
+            kept.append(int(part))
+        number[part] = near[0] if near else len(kept) - 1
+    return number
 
 
 def _weights(
@@ -67,11 +83,20 @@ def _weights(
 
     Ridge regression (Hoerl and Kennard 1970) towards 1.
     """
-    normals = np.concatenate([_even_directions(_ORIENTATIONS), np.eye(3), -np.eye(3)])
-    counts = np.ones(len(normals))
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    normals = np.concatenate([_even_directions(_ORIENTATIONS), axes])
+    # A floor beside a wall, and a wall over a floor: along one axis, with half of what they see hidden.
+    beside = [(normal, half) for normal in axes for half in axes if not normal @ half]
+    counts = np.ones(len(normals) + len(beside))
     counts[_ORIENTATIONS:] = _AXES_COUNT
-    wanted = np.maximum(normals @ directions.T, 0.0) @ power
-    given = np.maximum(normals @ middles.T, 0.0) * powers
+
+    def seen(towards: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, "surfaces n"]:
+        open_ones = np.maximum(normals @ towards.T, 0.0)
+        hidden = [np.maximum(towards @ normal, 0.0) * (towards @ half > 0.0) for normal, half in beside]
+        return np.concatenate([open_ones, np.stack(hidden)])
+
+    wanted = seen(directions) @ power
+    given = seen(middles) * powers
     scale = max(wanted.mean(), 1e-300)
     matrix, missing = given / scale, (wanted - given.sum(axis=1)) / scale
     weighted = matrix.T * (counts / counts.sum())

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from polygon_irradiance import polygon_irradiance
 
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.environment import Environment, even_sky, solid_angles
@@ -115,21 +116,6 @@ def test_beside_a_wall_the_sky_is_cut_off(shapes):
     expected = np.pi * RADIANCE * ((1.0 + distance / np.hypot(distance, 1.0)) / 2.0)[..., None]
     np.testing.assert_allclose(got.direct_irradiance, expected, rtol=0.02)
     np.testing.assert_allclose(got.direct_irradiance.mean(), expected.mean(), rtol=2e-3)
-
-
-def polygon_irradiance(corners: np.ndarray, points: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """E ÷ L of an even polygon over the horizon of each point.
-
-    Lambert (1760); Baum et al. (1989), "Improving Radiosity Solutions Through the Use of Analytically
-    Determined Form-Factors", eq. 6.
-    """
-    rays = corners - points[..., None, :]
-    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    following = np.roll(rays, -1, axis=-2)
-    across = np.cross(rays, following)
-    length = np.linalg.norm(across, axis=-1, keepdims=True)
-    angles = np.arctan2(length, (rays * following).sum(axis=-1, keepdims=True))
-    return np.abs(((across / length * angles) @ normal).sum(axis=-1)) / 2.0
 
 
 def test_the_polygon_formula_is_howell_s():

@@ -1,0 +1,118 @@
+"""Light from the sky: closed forms over open ground, beside a wall and in a well, and what is seen of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from built_scenes import quad, scene_of
+
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import LightSettings
+from vpltune.renderer.config.quality import Quality
+from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.scene.environment import Environment, even_sky, solid_angles, texel_directions
+from vpltune.renderer.scene.scene import Camera, Scene, scaled
+from vpltune.renderer.scene.sky_lights import sky_lights
+from vpltune.renderer.scene.transforms import look_at
+from vpltune.renderer.scene.views import View, scaled_view
+
+RADIANCE = (3.0, 2.0, 1.0)
+
+
+def config_of(sky_lights: int) -> TunedConfig:
+    quality = Quality(interleave=1, map_size=8, rsm_resolution=128)
+    return TunedConfig(ArtistParameters(vpl_count=16), quality=quality, light=LightSettings(1, sky_lights))
+
+
+def under_sky(meshes) -> Scene:
+    return replace(scene_of(meshes, [(0.5,) * 3]), environment=even_sky(RADIANCE))
+
+
+def view_from(eye, target=(0.0, 0.0, 0.0), yfov=0.5) -> View:
+    return View("sky", "fitted", (48, 48), Camera(look_at(list(eye), list(target)), yfov), ())
+
+
+def direct_over_radiance(gl_context, scene: Scene, view: View, lights: int) -> np.ndarray:
+    """E ÷ L of the floor's pixels."""
+    frame = Runtime(scene, context=gl_context).capture(view, config_of(lights), maps=False)
+    floor = frame.valid & (np.abs(frame.normal_world[..., 1]) > 0.9)
+    assert floor.sum() > 500
+    return frame.direct_irradiance[floor] / np.array(RADIANCE)
+
+
+@pytest.mark.parametrize("scale", [0.01, 1.0, 100.0])
+def test_open_ground_receives_pi_times_the_radiance(gl_context, scale):
+    """Within 1 %, at any scale: lights are weighted so that surfaces along the axes are right."""
+    scene = scaled(under_sky([quad((-10, 0, -10), (0, 0, 20), (20, 0, 0))]), scale)
+    view = scaled_view(view_from((0.0, 3.0, 0.01)), scale)
+    got = direct_over_radiance(gl_context, scene, view, 32)
+    np.testing.assert_allclose(got, np.pi, rtol=0.01)
+
+
+def test_under_a_half_infinite_wall_half_the_sky_is_left(gl_context):
+    """At its foot a wall hides half of the sky, and so half of the irradiance. 2 %, and 20 m high for 1 m."""
+    ground = quad((-10, 0, -10), (0, 0, 20), (20, 0, 0))
+    scene = under_sky([ground, quad((-40, 0, 0), (80, 0, 0), (0, 40, 0))])
+    got = direct_over_radiance(gl_context, scene, view_from((0.0, 2.0, 1.2), (0.0, 0.0, 1.0), 0.3), 64)
+    assert got.mean() == pytest.approx(np.pi / 2, rel=0.03)
+
+
+def test_the_floor_of_a_square_well_sees_its_opening(gl_context):
+    """Form factor of two squares of side 2 at distance 2: 0.1998 (Howell, Siegel and Mengüç 2010, C-11)."""
+    walls = [
+        quad((-1, 0, -1), (2, 0, 0), (0, 2, 0)),
+        quad((-1, 0, 1), (0, 2, 0), (2, 0, 0)),
+        quad((-1, 0, -1), (0, 2, 0), (0, 0, 2)),
+        quad((1, 0, -1), (0, 0, 2), (0, 2, 0)),
+    ]
+    scene = under_sky([quad((-1, 0, -1), (0, 0, 2), (2, 0, 0)), *walls])
+    got = direct_over_radiance(gl_context, scene, view_from((0.0, 3.9, 0.001)), 64)
+    assert got.mean() == pytest.approx(0.1998 * np.pi, rel=0.03)
+
+
+def test_the_sky_is_seen_where_nothing_else_is(gl_context):
+    """Each texel where it should be: the row and column of the direction that a pixel looks along."""
+    rng = np.random.default_rng(5)
+    radiance = rng.random((8, 16, 3)).astype(np.float32)
+    far_below = scene_of([quad((0, -50, 0), (1, 0, 0), (0, 0, 1))], [(0.5,) * 3])
+    scene = replace(far_below, environment=Environment(radiance))
+    runtime = Runtime(scene, context=gl_context)
+    directions = texel_directions(8, 16)
+    for row, column in ((0, 3), (2, 0), (3, 5), (5, 11), (4, 15)):
+        target = directions[row, column]
+        view = View("up", "fitted", (3, 3), Camera(look_at([0.0, 0.0, 0.0], target.tolist()), 0.02), ())
+        image = runtime.render(view, config_of(4), layer="direct")
+        np.testing.assert_allclose(image[1, 1], radiance[row, column], rtol=1e-6)
+
+
+def test_an_even_sky_is_even_for_every_orientation():
+    """With 32 lights: within 6 % for surfaces of 500 orientations, where a surface's horizon may run through
+    a light's part of the sky, and within 2 % along the axes, for which the lights are weighted."""
+    lights = sky_lights(even_sky(RADIANCE), 32)
+    towards = np.stack([-light.direction_world for light in lights])
+    power = np.array([light.intensity[0] for light in lights])
+    normals = np.random.default_rng(1).normal(size=(500, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    got = np.maximum(normals @ towards.T, 0.0) @ power / (np.pi * RADIANCE[0])
+    np.testing.assert_allclose(got, 1.0, atol=0.06)
+    axes = np.maximum(np.concatenate([np.eye(3), -np.eye(3)]) @ towards.T, 0.0) @ power
+    np.testing.assert_allclose(axes / (np.pi * RADIANCE[0]), 1.0, atol=0.02)
+
+
+def test_a_sun_in_the_map_is_one_light_of_its_flux():
+    radiance = np.full((32, 64, 3), 1e-3, np.float32)
+    radiance[6, 20] = 1e4
+    lights = sky_lights(Environment(radiance), 16)
+    sun = max(lights, key=lambda light: light.intensity.mean())
+    flux = 1e4 * solid_angles(32, 64)[6]
+    assert sun.intensity.mean() == pytest.approx(flux, rel=0.02)
+    angle = np.arccos(np.clip(-sun.direction_world @ texel_directions(32, 64)[6, 20], -1.0, 1.0))
+    assert angle < np.radians(3.0)
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 256])
+def test_never_more_lights_than_asked_for(count):
+    lights = sky_lights(even_sky(RADIANCE), count)
+    assert 1 <= len(lights) <= count
+    assert sky_lights(even_sky((0.0, 0.0, 0.0)), count) == ()

@@ -17,6 +17,7 @@ from vpltune.cli.program import run
 from vpltune.cli.quality_flags import with_flags
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.gltf_extras import EXTRAS_KEY, read_gltf_extras, write_gltf_extras
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import MetBudget, Quality
 from vpltune.renderer.config.tuned_config import (
     FitNote,
@@ -77,6 +78,7 @@ BROUGHT_FORWARD = TunedConfig(
     "transmittance",
     quality=OLDER_QUALITY,
     fit=FitNote("kept", "no gain"),
+    light=ONE_BOUNCE,
 )
 
 

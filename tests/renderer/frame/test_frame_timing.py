@@ -10,6 +10,7 @@ from built_scenes import colored_room, room_view
 from made_priors import made_prior
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame import frame_timing
@@ -26,6 +27,7 @@ PASSES = [
     "virtual_point_lights",
     "direct_light",
     "receiver_bounds",
+    "light_walks",
     "clustered_discs",
     "vpl_visibility_maps",
     "vpl_gather",
@@ -58,10 +60,10 @@ def without(*names: str) -> list[str]:
     return [name for name in PASSES if name not in names]
 
 
-def with_before(name: str, *added: str, but: str = "light_pre_pass") -> list[str]:
+def with_before(name: str, *added: str) -> list[str]:
     place = PASSES.index(name)
     passes = (*PASSES[:place], *added, *PASSES[place:])
-    return [each for each in passes if each not in ("light_pre_pass", but)]
+    return [each for each in passes if each != "light_pre_pass"]
 
 
 def changed(**parameters) -> TunedConfig:
@@ -79,13 +81,16 @@ CASES = {
         replace(SMALL, parameters=ArtistParameters(vpl_count=1)),
         without("light_pre_pass", "interleaved_filter"),
     ),
-    "points": (changed(lloyd_iterations=0), without("light_pre_pass", "clustered_discs")),
+    "points, and discs of later light": (changed(lloyd_iterations=0), without("light_pre_pass")),
+    "one bounce": (replace(SMALL, light=ONE_BOUNCE), without("light_pre_pass", "light_walks")),
+    "one bounce of points": (
+        replace(changed(lloyd_iterations=0), light=ONE_BOUNCE),
+        without("light_pre_pass", "light_walks", "clustered_discs"),
+    ),
     "no importance": (changed(density_importance=0.0), without("light_pre_pass", "vpl_importance")),
     "near field of points": (
         changed(lloyd_iterations=0, screen_space_strength=1.0),
-        with_before(
-            "material_resolve", "screen_space_indirect", "screen_space_filter", but="clustered_discs"
-        ),
+        with_before("material_resolve", "screen_space_indirect", "screen_space_filter"),
     ),
     "no near field of discs": (changed(screen_space_strength=1.0), without("light_pre_pass")),
     "prior": (

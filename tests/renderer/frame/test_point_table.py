@@ -5,6 +5,7 @@ import pytest
 from built_scenes import quad, scene_of
 from point_vpls import point_vpls
 
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.point_table import POISSON_RADIUS, point_table, poisson_disc, r2_sequence
@@ -64,7 +65,7 @@ def deviation(gl_context, table: str, density_exponent: float) -> float:
         context=gl_context,
     )
     parameters = point_vpls(vpl_count=256, density_exponent=density_exponent)
-    config = TunedConfig(parameters, quality=Quality(rsm_resolution=256))
+    config = TunedConfig(parameters, quality=Quality(rsm_resolution=256), light=ONE_BOUNCE)
     rotations = [(float(u), float(v)) for u, v in np.random.default_rng(0).random((64, 2))]
     frames = runtime.captures(view, config, rotations)
     seen = frames[0].valid & (frames[0].normal_world[..., 1] > 0.9)

@@ -8,6 +8,7 @@ from built_scenes import ROOM_LIGHTS, colored_room, room_view
 from moving_scenes import bent_board
 from point_vpls import point_vpls
 
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.animation import AnimationPlayer
@@ -17,7 +18,7 @@ from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 
 # Visibility maps see a skin as rigid pieces, see renderer/gpu/ray_hierarchy.py.
-WITHOUT_MAPS = TunedConfig(point_vpls(), visibility="transmittance")
+WITHOUT_MAPS = TunedConfig(point_vpls(), visibility="transmittance", light=ONE_BOUNCE)
 # As points: which disc a sample goes to may hang on its last digit.
 MAPS = WITHOUT_MAPS.seen_by("maps")
 BUFFERS = ("position_world", "normal_world", "direct_irradiance", "indirect_irradiance")

@@ -7,6 +7,7 @@ import pytest
 from built_scenes import colored_room, quad, room_view, scene_of
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.drawn_frame import DrawnFrame
@@ -19,7 +20,7 @@ from vpltune.renderer.scene.views import View
 from vpltune.tuner.prior.scene_generator import generated_scene
 
 QUALITY = Quality(interleave=1, rsm_resolution=128)
-POINTS = TunedConfig(ArtistParameters(vpl_count=48, lloyd_iterations=0), quality=QUALITY)
+POINTS = TunedConfig(ArtistParameters(vpl_count=48, lloyd_iterations=0), quality=QUALITY, light=ONE_BOUNCE)
 DISCS = replace(POINTS, parameters=replace(POINTS.parameters, lloyd_iterations=1))
 INTERLEAVED = replace(DISCS, quality=replace(QUALITY, interleave=4))
 SIZE = (50, 38)

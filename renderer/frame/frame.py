@@ -274,20 +274,14 @@ class Frame:
         resources, setup, pools = self.resources, self.setup, self.setup.pools
         if hierarchy is not None:
             hierarchy.add_to(resources)
-        discs = [DiscPool.first(pools.first)]
         has_lamps = setup.face_count > 0
-        starts = None
-        light: list[FramePass] = []
-        glowing_discs = None
+        emitting = None
         if glowing is not None:
-            glowing_discs = DiscPool("glowing", pools.glowing, sample_count(pools.glowing))
-            light.append(GlowingSurfacesPass(resources, glowing, glowing_discs))
-        if pools.later:
-            assert hierarchy is not None, "light walks along rays"
-            lamp_walks = WALKS // (1 + (glowing is not None))
-            starts = walk_table(lamp_walks)[:, :2] if has_lamps else None
-        light.insert(
-            0,
+            emitting = DiscPool("glowing", pools.glowing, sample_count(pools.glowing))
+        starts = None
+        if pools.later and has_lamps:
+            starts = walk_table(WALKS if emitting is None else WALKS // 2)[:, :2]
+        light: list[FramePass] = [
             VirtualPointLightsPass(
                 resources,
                 self.rsm,
@@ -296,15 +290,18 @@ class Frame:
                 options.rsm_filtering,
                 setup.importance_cells,
                 starts,
-            ),
-        )
+            )
+        ]
+        discs = [DiscPool.first(pools.first)]
+        if glowing is not None and emitting is not None:
+            light.append(GlowingSurfacesPass(resources, glowing, emitting))
         if pools.later:
             assert hierarchy is not None, "light walks along rays"
-            walks = LightWalksPass(resources, hierarchy, setup.bounces, glowing_discs, has_lamps=has_lamps)
+            walks = LightWalksPass(resources, hierarchy, setup.bounces, emitting, has_lamps=has_lamps)
             light.append(walks)
             discs.append(DiscPool("later", pools.later, walks.sample_count))
-        if glowing_discs is not None:
-            discs.append(glowing_discs)
+        if emitting is not None:
+            discs.append(emitting)
         clustered = [ClusteredDiscsPass(resources, pool) for pool in discs]
         return [*light, *clustered, JoinedVplsPass(resources, discs)]
 

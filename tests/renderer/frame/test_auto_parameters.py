@@ -9,6 +9,7 @@ from made_priors import made_prior
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
 from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.clip_state import ClipState
@@ -21,7 +22,7 @@ BASE = ArtistParameters(vpl_count=64, screen_space_radius=5.0)
 POINTS = dataclasses.replace(BASE, lloyd_iterations=0)
 """Clusters go on from frame to frame in a clip; points do not."""
 QUALITY = Quality(rsm_resolution=128, adaptation_frames=2.0)
-CONFIG = TunedConfig(BASE, visibility="maps", auto=made_prior(), quality=QUALITY)
+CONFIG = TunedConfig(BASE, visibility="maps", auto=made_prior(), quality=QUALITY, light=ONE_BOUNCE)
 GENTLE = dataclasses.replace(CONFIG, auto=made_prior(strength=0.2))
 
 

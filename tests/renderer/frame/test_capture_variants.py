@@ -9,6 +9,7 @@ from made_priors import made_prior
 from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, placement
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -25,7 +26,7 @@ VIEW = room_view("spot", size=(24, 18))
 
 
 def config_of(parameters: ArtistParameters, **quality) -> TunedConfig:
-    return TunedConfig(parameters, quality=replace(QUALITY, **quality))
+    return TunedConfig(parameters, quality=replace(QUALITY, **quality), light=ONE_BOUNCE)
 
 
 @pytest.fixture(scope="module")

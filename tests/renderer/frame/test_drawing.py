@@ -12,6 +12,7 @@ from made_priors import made_prior
 from point_vpls import point_vpls
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.parameter_block import BLOCK_BYTES
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import FitNote, TunedConfig
@@ -26,7 +27,7 @@ from vpltune.renderer.scene.dynamic_lights import DynamicLights, point_lights
 SIZE = (24, 18)
 VIEW = room_view("spot", SIZE)
 QUALITY = Quality(map_size=8, rsm_resolution=64)
-PLAIN = TunedConfig(point_vpls(vpl_count=64), quality=QUALITY)
+PLAIN = TunedConfig(point_vpls(vpl_count=64), quality=QUALITY, light=ONE_BOUNCE)
 LIGHTS = DynamicLights(point_lights(np.array([[0.2, 0.3, 0.4]]), np.full(3, 0.3), 1.5))
 
 
@@ -40,7 +41,7 @@ def with_quality(**changes) -> TunedConfig:
 
 CONFIGS = {
     "plain": PLAIN,
-    "default": TunedConfig(ArtistParameters(vpl_count=64), quality=QUALITY),
+    "default": TunedConfig(ArtistParameters(vpl_count=64), quality=QUALITY, light=ONE_BOUNCE),
     "brighter": with_parameters(intensity=2.0),
     "softer": with_parameters(falloff_footprint=4.0, extinction_coefficient=0.5),
     "other maps": with_parameters(visibility_bias=0.05, visibility_softness=0.4),

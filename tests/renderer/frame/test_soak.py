@@ -10,6 +10,7 @@ from built_scenes import ROOM_LIGHTS
 from moving_scenes import bent_board
 from point_vpls import point_vpls
 
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -40,7 +41,9 @@ class Soak:
         self.scene = bent_board(seconds_per_turn=4.0)
         # The smallest map that a config may ask for.
         quality = Quality(interleave=2, rsm_resolution=64)
-        self.config = TunedConfig(point_vpls(vpl_count=64, screen_space_strength=1.0), quality=quality)
+        self.config = TunedConfig(
+            point_vpls(vpl_count=64, screen_space_strength=1.0), quality=quality, light=ONE_BOUNCE
+        )
         self.runtime = Runtime(self.scene, RuntimeOptions(light_path="tiles"), context=context)
         camera = Camera(look_at(np.array([0.0, 0.0, 3.6]), np.zeros(3)), float(np.radians(40.0)))
         lights = tuple(ROOM_LIGHTS[kind] for kind in ("spot", "point", "directional"))

@@ -5,6 +5,7 @@ import pytest
 from built_scenes import colored_room, room_view
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import MAP_REFINEMENTS, Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame import visibility_map_layout
@@ -18,7 +19,8 @@ VIEW = room_view("spot", (32, 24))
 def room_capture(gl_context, size: int, refinement: int, vpl_count: int = 64) -> CapturedFrame:
     """The room's VPLs and light, where OpenGL has nothing to say against it."""
     quality = Quality(map_size=size, map_refinement=refinement, rsm_resolution=256)
-    config = TunedConfig(ArtistParameters(vpl_count=vpl_count), visibility="maps", quality=quality)
+    parameters = ArtistParameters(vpl_count=vpl_count)
+    config = TunedConfig(parameters, visibility="maps", quality=quality, light=ONE_BOUNCE)
     return Runtime(colored_room(), context=gl_context).capture(VIEW, config)
 
 

@@ -230,7 +230,7 @@ def test_the_key_follows_options_but_not_where_the_start_came_from(tmp_path):
         replace(plain, start=config_text(TunedConfig(quality=Quality(map_size=8)))),
         replace(plain, start=config_text(TunedConfig(quality=Quality(map_refinement=1)))),
         replace(plain, start=config_text(TunedConfig(quality=Quality(rsm_resolution=256)))),
-        replace(plain, start=config_text(TunedConfig(light=LightSettings("all")))),
+        replace(plain, start=config_text(TunedConfig(light=LightSettings(1)))),
         replace(plain, sky=(1.0, 1.0, 1.0)),
         replace(plain, environment=str(tmp_path / "absent.exr")),
     ]

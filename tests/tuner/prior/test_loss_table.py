@@ -10,6 +10,7 @@ from built_scenes import colored_room, room_view
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
 from vpltune.renderer.config.auto_prior import AUTO_PARAMETERS
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
@@ -41,7 +42,9 @@ def view(gl_context) -> CapturedView:
     """A room whose reference is the runtime's own image with other parameters, with noise in both halves."""
     gl_context.__enter__()
     truth = replace(PARAMETERS, intensity=1.4, falloff_footprint=1.5)
-    config = TunedConfig(truth, visibility="maps", quality=Quality(rsm_resolution=128))
+    quality = Quality(rsm_resolution=128)
+    # The bound on what lies between nodes was measured with the VPLs of one bounce.
+    config = TunedConfig(truth, visibility="maps", quality=quality, light=ONE_BOUNCE)
     drawn = Runtime(colored_room(), context=gl_context).capture(room_view(), config)
     noise = np.random.default_rng(0).normal(1.0, 0.05, (2, *drawn.indirect_irradiance.shape))
     halves = (drawn.indirect_irradiance * noise).astype(np.float32)

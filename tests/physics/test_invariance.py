@@ -149,6 +149,7 @@ def test_no_absolute_length_in_a_shader():
         "1e-3",  # a share of the scene length
         "2e-3",  # a share of a distance
         "1e-4",  # a cosine
+        "1e-5",  # a share of the scene's diagonal
         "1e-8",  # a share of a direction
     }
     number = re.compile(r"(?<![\w.])(?:\d+\.\d*|\.\d+|\d+)e-\d+")

@@ -2,14 +2,14 @@
 
 import moderngl
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Float64
 
-from vpltune.renderer.files.srgb import linear_from_srgb
 from vpltune.renderer.gpu.gpu_context import check_errors
 from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.gpu.rigid_pieces import RigidPiece, rigid_pieces
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
 from vpltune.renderer.scene.scene import Material, Scene
+from vpltune.renderer.scene.triangle_texels import equal_pieces, mean_texels
 
 GLOWING_READS = ("glowing_triangles", "glowing_places")
 """What a program declares that includes `common/glowing_triangles.glsl`."""
@@ -70,7 +70,7 @@ def _records(scene: Scene, piece: RigidPiece, place: int, cuts: int) -> np.ndarr
     corners = piece.corners.astype(np.float64)
     uv = mesh.uv[mesh.triangles[piece.triangles]].astype(np.float64)
     if material.emission_texture is not None and cuts > 1:
-        weights = _cut(cuts)
+        weights = equal_pieces(cuts)
         corners = np.einsum("kvw,twa->tkva", weights, corners).reshape(-1, 3, 3)
         uv = np.einsum("kvw,twa->tkva", weights, uv).reshape(-1, 3, 2)
     radiance = _radiance(scene, material, uv)
@@ -86,40 +86,9 @@ def _records(scene: Scene, piece: RigidPiece, place: int, cuts: int) -> np.ndarr
 def _radiance(
     scene: Scene, material: Material, uv: Float64[np.ndarray, "triangles 3 2"]
 ) -> Float64[np.ndarray, "triangles 3"]:
-    """The mean radiance of each triangle: that of a few places of its texture, without filtering."""
+    """The mean radiance of each triangle in W/(m² sr)."""
     # A blended surface emits by the share of the light that it stops.
     emission = np.array(material.emission) * (material.opacity if material.is_blended else 1.0)
     if material.emission_texture is None:
         return np.broadcast_to(emission, (len(uv), 3))
-    texture = scene.textures[material.emission_texture]
-    height, width, _ = texture.texels_srgb.shape
-    # The middles of the pieces that the triangle would be cut into.
-    middles = _cut(4).mean(axis=1)
-    places = np.einsum("kw,twa->tka", middles, uv)
-    columns, rows = (
-        _texel(places[..., 0], width, texture.wrap_u),
-        _texel(places[..., 1], height, texture.wrap_v),
-    )
-    return emission * linear_from_srgb(texture.texels_srgb[rows, columns] / 255.0).mean(axis=1)
-
-
-def _texel(coordinate: Float64[np.ndarray, "*shape"], size: int, wrap: str) -> Int64[np.ndarray, "*shape"]:
-    coordinate = np.nan_to_num(coordinate)
-    if wrap == "repeat":
-        coordinate = coordinate % 1.0
-    elif wrap == "mirrored_repeat":
-        coordinate = 1.0 - np.abs(coordinate % 2.0 - 1.0)
-    return np.clip((coordinate * size).astype(np.int64), 0, size - 1)
-
-
-def _cut(count: int) -> Float64[np.ndarray, "pieces 3 3"]:
-    """Barycentric coordinates of the corners of count² equal pieces of a triangle, which keep its winding."""
-    pieces = []
-    for row in range(count):
-        for column in range(count - row):
-            low, right, up = (column, row), (column + 1, row), (column, row + 1)
-            pieces.append([low, right, up])
-            if column + row + 2 <= count:
-                pieces.append([right, (column + 1, row + 1), up])
-    place = np.array(pieces, np.float64) / count
-    return np.concatenate([1.0 - place.sum(axis=2, keepdims=True), place], axis=2)
+    return emission * mean_texels(scene.textures[material.emission_texture], uv)

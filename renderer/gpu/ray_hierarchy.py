@@ -24,8 +24,8 @@ from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.gpu.rigid_pieces import first_matrix_rows, pieces_of_mesh
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
 from vpltune.renderer.gpu.shader_library import Define
-from vpltune.renderer.scene.placement.triangle_albedo import triangle_albedo
 from vpltune.renderer.scene.scene import Scene
+from vpltune.renderer.scene.triangle_albedo import triangle_albedo
 
 # Levels of a mesh's tree, and of the tree over instances; deeper parts become larger leaves. Choices, which
 # set the stack of a ray.

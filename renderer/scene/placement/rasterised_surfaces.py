@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int64
 
 from vpltune.renderer.scene.panes import is_pane
-from vpltune.renderer.scene.placement.triangle_albedo import triangle_albedo
 from vpltune.renderer.scene.scene import Scene
 from vpltune.renderer.scene.transforms import transform_points
+from vpltune.renderer.scene.triangle_albedo import triangle_albedo
 
 # Most surface samples of one grid; scenes that would need more get a coarser grid. 2²⁴ samples take about a
 # second.

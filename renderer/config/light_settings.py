@@ -1,10 +1,9 @@
 """The light part of a config: which of a scene's light is drawn."""
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-from vpltune.renderer.errors import InputError
+from vpltune.renderer.config.member_rules import check_whole, known_members, whole_as_int
 
 MOST_BOUNCES = 64
 """Reflections that can be asked for. A choice: the reference's longest path (`BOUNCE_LIMIT` of
@@ -34,17 +33,9 @@ class LightSettings:
 
     def check(self, where: str) -> None:
         """Raise InputError, naming `where`, if a field is out of range."""
-        whole = isinstance(self.bounces, int) and not isinstance(self.bounces, bool)
-        if self.bounces != "all" and not (whole and 1 <= int(self.bounces) <= MOST_BOUNCES):
-            raise InputError(
-                f'{where}.bounces: must be "all" or a whole number from 1 to {MOST_BOUNCES}, '
-                f"got {self.bounces!r:.60}"
-            )
-        count = self.sky_lights
-        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_SKY_LIGHTS:
-            raise InputError(
-                f"{where}.sky_lights: must be a whole number from 1 to {MOST_SKY_LIGHTS}, got {count!r:.60}"
-            )
+        if self.bounces != "all":
+            check_whole(self.bounces, 1, MOST_BOUNCES, f"{where}.bounces", "all")
+        check_whole(self.sky_lights, 1, MOST_SKY_LIGHTS, f"{where}.sky_lights")
 
     @property
     def most_bounces(self) -> int | None:
@@ -62,19 +53,13 @@ class LightSettings:
         Raises:
             InputError: not an object, an unknown key, or a value out of range. `where` names it.
         """
-        if not isinstance(values, Mapping):
-            raise InputError(f"{where}: must be an object, got {type(values).__name__}")
-        known = cls.__dataclass_fields__
-        for key in values:
-            if key not in known:
-                raise InputError(f"{where}: unknown key {key!r:.60}; known are {', '.join(known)}")
+        known = tuple(cls.__dataclass_fields__)
+        members = known_members(values, known, where)
         # Checked before the object exists, so that the error names the file.
         unchecked = object.__new__(cls)
         for name in known:
-            value: Any = values.get(name, getattr(ONE_BOUNCE, name))
-            # Some programs write 3 as 3.0.
-            whole = isinstance(value, float) and value.is_integer()
-            object.__setattr__(unchecked, name, int(value) if whole else value)
+            value = whole_as_int(members.get(name, getattr(ONE_BOUNCE, name)))
+            object.__setattr__(unchecked, name, value)
         unchecked.check(where)
         return cls(unchecked.bounces, unchecked.sky_lights)
 

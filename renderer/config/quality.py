@@ -3,10 +3,16 @@
 `vpltune fit --budget-ms` finds them, and every command draws with them unless a flag overrides one.
 """
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from vpltune.renderer.config.member_rules import (
+    check_number,
+    check_one_of,
+    check_whole,
+    known_members,
+    whole_as_int,
+)
 from vpltune.renderer.errors import InputError
 
 INTERLEAVES = (1, 2, 4, 8)
@@ -73,12 +79,12 @@ class Quality:
     def check(self, where: str) -> None:
         """Raise InputError, naming `where`, if a field is out of range."""
         if self.interleave != "auto":
-            _one_of(self.interleave, INTERLEAVES, f"{where}.interleave", "auto")
-        _whole(self.map_size, SMALLEST_MAP, LARGEST_MAP, f"{where}.map_size")
-        _one_of(self.map_refinement, MAP_REFINEMENTS, f"{where}.map_refinement")
+            check_one_of(self.interleave, INTERLEAVES, f"{where}.interleave", "auto")
+        check_whole(self.map_size, SMALLEST_MAP, LARGEST_MAP, f"{where}.map_size")
+        check_one_of(self.map_refinement, MAP_REFINEMENTS, f"{where}.map_refinement")
         if self.rsm_resolution is not None:
-            _whole(self.rsm_resolution, SMALLEST_RSM, LARGEST_RSM, f"{where}.rsm_resolution")
-        _number(self.adaptation_frames, 0.0, LONGEST_ADAPTATION, f"{where}.adaptation_frames")
+            check_whole(self.rsm_resolution, SMALLEST_RSM, LARGEST_RSM, f"{where}.rsm_resolution")
+        check_number(self.adaptation_frames, 0.0, LONGEST_ADAPTATION, f"{where}.adaptation_frames")
 
     def interleave_for(self, vpl_count: int, frame_size: tuple[int, int]) -> int:
         """The side of a block: `interleave`, or less where a block would have more pixels than VPLs.
@@ -113,12 +119,12 @@ class Quality:
         Raises:
             InputError: not an object, an unknown key, or a value out of range.
         """
-        members = _members(values, (*cls.__dataclass_fields__, *others), where)
+        members = known_members(values, (*cls.__dataclass_fields__, *others), where)
         for name in ("interleave", "map_size", "map_refinement", "rsm_resolution"):
             if name in members:
-                members[name] = _integer(members[name])
+                members[name] = whole_as_int(members[name])
         if "rsm_resolution" in members:
-            _whole(members["rsm_resolution"], SMALLEST_RSM, LARGEST_RSM, f"{where}.rsm_resolution")
+            check_whole(members["rsm_resolution"], SMALLEST_RSM, LARGEST_RSM, f"{where}.rsm_resolution")
         if "budget" in members:
             members["budget"] = _budget(members["budget"], f"{where}.budget")
         # Checked before the object exists, so that the error names the file.
@@ -178,52 +184,19 @@ def quality_schema(lloyd_iterations: dict[str, Any]) -> dict[str, Any]:
 
 def _budget(values: Any, where: str) -> MetBudget:
     names = ("milliseconds", "frame_size", "machine")
-    members = _members(values, names, where)
+    members = known_members(values, names, where)
     for name in names:
         if name not in members:
             raise InputError(f"{where}: key '{name}' is missing")
     milliseconds, size, machine = (members[name] for name in names)
-    _number(milliseconds, 0.0, 1e9, f"{where}.milliseconds")
+    check_number(milliseconds, 0.0, 1e9, f"{where}.milliseconds")
     if not milliseconds > 0.0:
         raise InputError(f"{where}.milliseconds: must be positive, got {milliseconds!r}")
     if not isinstance(size, list) or len(size) != 2:
         raise InputError(f"{where}.frame_size: must be [width, height], got {size!r:.60}")
-    size = [_integer(side) for side in size]
+    size = [whole_as_int(side) for side in size]
     for side in size:
-        _whole(side, 1, LARGEST_SIDE, f"{where}.frame_size")
+        check_whole(side, 1, LARGEST_SIDE, f"{where}.frame_size")
     if not isinstance(machine, str):
         raise InputError(f"{where}.machine: must be a string, got {machine!r:.60}")
     return MetBudget(float(milliseconds), (size[0], size[1]), machine)
-
-
-def _members(values: Any, known: tuple[str, ...], where: str) -> dict[str, Any]:
-    if not isinstance(values, Mapping):
-        raise InputError(f"{where}: must be an object, got {type(values).__name__}")
-    for key in values:
-        if key not in known:
-            raise InputError(f"{where}: unknown key {key!r:.60}; known are {', '.join(known)}")
-    return dict(values)
-
-
-def _integer(value: Any) -> Any:
-    """A whole number that is written as a fraction, 24.0, as an int; anything else as it is."""
-    return int(value) if isinstance(value, float) and value.is_integer() else value
-
-
-def _one_of(value: Any, allowed: tuple[int, ...], where: str, word: str | None = None) -> None:
-    """`word` is named in the error as one more allowed value."""
-    if isinstance(value, bool) or not isinstance(value, int) or value not in allowed:
-        names = ", ".join(([word] if word else []) + [str(each) for each in allowed])
-        raise InputError(f"{where}: must be one of {names}, got {value!r:.60}")
-
-
-def _whole(value: Any, low: int, high: int, where: str) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise InputError(f"{where}: must be a whole number from {low} to {high}, got {value!r:.60}")
-
-
-def _number(value: Any, low: float, high: float, where: str) -> None:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    # False for NaN, and no conversion to float, which overflows on 10**400.
-    if not number or not low <= value <= high:
-        raise InputError(f"{where}: must be a number from {low:g} to {high:g}, got {value!r:.60}")

@@ -32,6 +32,7 @@ from vpltune.renderer.config.auto_prior import AutoPrior
 from vpltune.renderer.config.config_versions import brought_forward
 from vpltune.renderer.config.gltf_extras import GLTF_SUFFIXES, read_gltf_extras
 from vpltune.renderer.config.light_settings import ONE_BOUNCE, LightSettings
+from vpltune.renderer.config.member_rules import whole_as_int
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
@@ -337,4 +338,4 @@ def _canonical(value: Any) -> Any:
         return {key: _canonical(member) for key, member in value.items()}
     if isinstance(value, list):
         return [_canonical(member) for member in value]
-    return int(value) if isinstance(value, float) and value.is_integer() else value
+    return whole_as_int(value)

@@ -14,7 +14,6 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.auto_prior import AutoPrior
 from vpltune.renderer.config.parameter_block import BLOCK_BYTES, parameter_bytes, unpack_parameters
 from vpltune.renderer.config.tuned_config import TunedConfig
-from vpltune.renderer.frame.disc_samples import sample_count
 from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
 from vpltune.renderer.frame.frame_timing import PassClock
 from vpltune.renderer.frame.light_pre_pass import LightPrePass
@@ -277,7 +276,7 @@ class Frame:
         has_lamps = setup.face_count > 0
         emitting = None
         if glowing is not None:
-            emitting = DiscPool("glowing", pools.glowing, sample_count(pools.glowing))
+            emitting = DiscPool.glowing(pools.glowing)
         starts = None
         if pools.later and has_lamps:
             starts = walk_table(WALKS if emitting is None else WALKS // 2)[:, :2]
@@ -297,9 +296,11 @@ class Frame:
             light.append(GlowingSurfacesPass(resources, glowing, emitting))
         if pools.later:
             assert hierarchy is not None, "light walks along rays"
-            walks = LightWalksPass(resources, hierarchy, setup.bounces, emitting, has_lamps=has_lamps)
+            walks = LightWalksPass(
+                resources, hierarchy, setup.bounces, emitting, pools.later, has_lamps=has_lamps
+            )
             light.append(walks)
-            discs.append(DiscPool("later", pools.later, walks.sample_count))
+            discs.append(DiscPool.later(pools.later, walks.sample_count))
         if emitting is not None:
             discs.append(emitting)
         clustered = [ClusteredDiscsPass(resources, pool) for pool in discs]

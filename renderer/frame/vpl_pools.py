@@ -66,11 +66,23 @@ class DiscPool:
     """Begins the names of its buffers: `NAME_samples`, `NAME_members`, `NAME_vpls`."""
     vpl_count: int
     sample_count: int
+    starts: str
+    """The buffer of the samples that the discs start at, one for each."""
 
     @classmethod
     def first(cls, vpl_count: int) -> "DiscPool":
         """The pool of `VplPools.first`."""
-        return cls("first", vpl_count, sample_count(vpl_count))
+        return cls("first", vpl_count, sample_count(vpl_count), "first_samples")
+
+    @classmethod
+    def glowing(cls, vpl_count: int) -> "DiscPool":
+        """The pool of `VplPools.glowing`."""
+        return cls("glowing", vpl_count, sample_count(vpl_count), "glowing_samples")
+
+    @classmethod
+    def later(cls, vpl_count: int, samples: int) -> "DiscPool":
+        """The pool of `VplPools.later`, clustered from so many samples; discs start at lit ones."""
+        return cls("later", vpl_count, samples, "later_starts")
 
     @property
     def vpls(self) -> str:

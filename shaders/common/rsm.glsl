@@ -1,11 +1,13 @@
 // Reads the reflective shadow map (RSM). The atlas holds one square tile for each light face, column by column and row
 // by row.
 //
-// Provides: `rsm_texel`, `rsm_position_on_plane`, `mean_flux`. Texture depth is reversed, 0 where nothing was drawn.
+// Provides: `rsm_texel`, `rsm_position_on_plane`, and `mean_flux` of common/mean_flux.glsl. Texture depth is reversed, 0
+// where nothing was drawn.
 // Constants: RSM_RESOLUTION, texels along the side of a tile.
 // Python: `ReflectiveShadowMap` in renderer/gpu/render_targets.py. A numpy version of `rsm_texel`:
 // renderer/techniques/vpls_readback.py. Source: Dachsbacher and Stamminger 2005.
 #include "common/lights.glsl"
+#include "common/mean_flux.glsl"
 #include "common/octahedral.glsl"
 
 uniform sampler2D rsm_depth;
@@ -95,9 +97,4 @@ vec3 rsm_position_on_plane(RsmTexel texel, vec2 place) {
         return texel.position_world;
     }
     return start + ray * (dot(texel.normal_world, texel.position_world - start) / along);
-}
-
-// Flux as one number: the mean of the channels, because the error measure weighs all channels alike.
-float mean_flux(vec3 flux) {
-    return (flux.r + flux.g + flux.b) / 3.0;
 }

@@ -12,11 +12,13 @@
 // no noise of its own.
 // The samples of step s are the light of s + 1 reflections, or of s + 2 if the walk began in an RSM, where the light had
 // been reflected once.
-// First: common/ray_alpha.glsl includes it only where there are holes.
+
+// First, since common/ray_alpha.glsl includes it only where there are holes.
 #include "common/hash.glsl"
 #include "common/virtual_point_lights.glsl"
 #include "common/ray_hierarchy.glsl"
 #include "common/hemi_octahedral.glsl"
+#include "common/mean_flux.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -106,17 +108,13 @@ VirtualPointLight next_reflection(VirtualPointLight place, vec2 numbers, uint se
         vec4(place.flux.rgb * ray_hit_albedo(hit), 0.0));
 }
 
-float mean_flux(VirtualPointLight one) {
-    return (one.flux.r + one.flux.g + one.flux.b) / 3.0;
-}
-
 #if WALK_ENDS
 // One of all reflections from `first` on, drawn by its flux (Chao 1982), with the flux of all of them. From there on a
 // walk ends by Russian roulette, as its light may be caught in a corner that absorbs little.
 VirtualPointLight one_of_the_rest(VirtualPointLight first, int ray, uint seed) {
     VirtualPointLight place = first;
     VirtualPointLight drawn = first;
-    float total = mean_flux(first);
+    float total = mean_flux(first.flux.rgb);
     for (int i = 0; i < WALK_MOST_RAYS; ++i) {
         vec2 chances = walk_numbers(seed, 2 * (ray + i) + 1);
         VirtualPointLight next = next_reflection(place, walk_numbers(seed, 2 * (ray + i)), seed + uint(ray + i));
@@ -125,7 +123,7 @@ VirtualPointLight one_of_the_rest(VirtualPointLight first, int ray, uint seed) {
         if (!(most > 0.0)) {
             break;
         }
-        float flux = mean_flux(next);
+        float flux = mean_flux(next.flux.rgb);
         total += flux;
         if (chances.x * total < flux) {
             drawn = next;
@@ -137,7 +135,7 @@ VirtualPointLight one_of_the_rest(VirtualPointLight first, int ray, uint seed) {
         place = next;
         place.flux.rgb /= survival;
     }
-    drawn.flux.rgb *= total / max(mean_flux(drawn), 1e-30);
+    drawn.flux.rgb *= total / max(mean_flux(drawn.flux.rgb), 1e-30);
     return drawn;
 }
 #endif
@@ -158,7 +156,7 @@ void main() {
         }
         place = reflected;
 #if WALK_ENDS
-        if (i == steps - 1 && mean_flux(reflected) > 0.0) {
+        if (i == steps - 1 && mean_flux(reflected.flux.rgb) > 0.0) {
             reflected = one_of_the_rest(reflected, steps, seed);
         }
 #endif

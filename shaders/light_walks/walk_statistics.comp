@@ -1,13 +1,14 @@
-// Light walks, part 2: the weight and the footprint of each sample, and the scene length L where surfaces glow. One
-// workgroup, and every sum in a fixed order, so that frames repeat bitwise.
+// Light walks, part 2: the weight and the footprint of each sample, the samples that discs start at, and the scene length
+// L where surfaces glow. One workgroup, and every sum in a fixed order, so that frames repeat bitwise.
 //
-// Reads and writes: samples, frame statistics. Constants: WALK_GROUP_SIZE, WALK_STEPS, WALK_LAMPS, WALK_GLOWING,
-// WALK_SPREAD. Python: renderer/frame/passes/light_walks.py.
+// Reads and writes: samples, frame statistics. Writes: starts of the discs.
+// Constants: WALK_GROUP_SIZE, WALK_STEPS, WALK_LAMPS, WALK_GLOWING, WALK_SPREAD. Python: renderer/frame/passes/light_walks.py.
 //
 // L is the RMS distance from their centroid of the places that light reaches first, weighted by flux: the RSM's texels,
 // and the first reflections of light that surfaces emit.
 #include "common/scene_length.glsl"
 #include "common/virtual_point_lights.glsl"
+#include "common/mean_flux.glsl"
 
 layout(local_size_x = WALK_GROUP_SIZE) in;
 
@@ -15,17 +16,19 @@ layout(std430, binding = LATER_SAMPLES_BINDING) buffer LaterSamples {
     VirtualPointLight later_samples[];
 };
 
+layout(std430, binding = LATER_STARTS_BINDING) writeonly buffer LaterStarts {
+    VirtualPointLight later_starts[];  // one for each disc
+};
+
 uniform int walk_count;
+uniform int disc_count;
 uniform vec3 moment_origin;  // a point near the scene, from where sums of squares lose few digits
 
 const float PI = 3.14159265358979;
 
+shared int lit_counts[WALK_GROUP_SIZE];
 shared vec4 sums_position[WALK_GROUP_SIZE];  // Σ flux · offset; Σ flux
 shared vec2 sums_rest[WALK_GROUP_SIZE];      // Σ flux · |offset|²; Σ flux of all first reflections
-
-float mean_flux(VirtualPointLight one) {
-    return (one.flux.r + one.flux.g + one.flux.b) / 3.0;
-}
 
 void main() {
     int lane = int(gl_LocalInvocationIndex);
@@ -33,7 +36,7 @@ void main() {
     vec2 rest = vec2(0.0);
     for (int walk = lane; walk < walk_count; walk += WALK_GROUP_SIZE) {
         VirtualPointLight one = later_samples[walk * WALK_STEPS];
-        float flux = mean_flux(one);
+        float flux = mean_flux(one.flux.rgb);
         rest.y += flux;
 #if WALK_GLOWING
         if (!(WALK_LAMPS != 0 && walk % 2 == 0) && flux > 0.0) {
@@ -71,10 +74,35 @@ void main() {
     // Samples of more flux count for more, as weights about 1 for a first reflection.
     float unit = max(sums_rest[0].y / float(walk_count), 1e-30);
     float footprint = WALK_SPREAD * scene_length * inversesqrt(float(walk_count));
-    for (int i = lane; i < walk_count * WALK_STEPS; i += WALK_GROUP_SIZE) {
-        float flux = mean_flux(later_samples[i]);
+    // Each invocation takes a run of samples. In an open scene most are dark, and a disc that started there would stay
+    // dark: discs start at the first lit ones.
+    int samples = walk_count * WALK_STEPS;
+    int run = (samples + WALK_GROUP_SIZE - 1) / WALK_GROUP_SIZE;
+    int begin = min(lane * run, samples);
+    int end = min(begin + run, samples);
+    int lit = 0;
+    for (int i = begin; i < end; ++i) {
+        float flux = mean_flux(later_samples[i].flux.rgb);
         later_samples[i].position_footprint.w = footprint;
         later_samples[i].normal_area.w = flux > 0.0 ? PI * footprint * footprint : 0.0;
         later_samples[i].flux.w = flux / unit;
+        lit += int(flux > 0.0);
+    }
+    lit_counts[lane] = lit;
+    barrier();
+    int before = 0;
+    int all = 0;
+    for (int i = 0; i < WALK_GROUP_SIZE; ++i) {
+        before += i < lane ? lit_counts[i] : 0;
+        all += lit_counts[i];
+    }
+    for (int i = begin; i < end && before < disc_count; ++i) {
+        if (later_samples[i].normal_area.w > 0.0) {
+            later_starts[before] = later_samples[i];
+            before += 1;
+        }
+    }
+    for (int i = all + lane; i < disc_count; i += WALK_GROUP_SIZE) {
+        later_starts[i] = NO_VPL;
     }
 }

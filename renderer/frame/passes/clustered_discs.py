@@ -42,7 +42,7 @@ class ClusteredDiscsPass(FramePass):
         pool, state, resources = self._pool, inputs.state, self._resources
         count, samples = pool.vpl_count, pool.sample_count
         if state is None:
-            resources.copy(pool.samples, pool.vpls)
+            resources.copy(pool.starts, pool.vpls)
         else:
             size = resources.buffer(pool.vpls).size
             carried = state.buffer(resources.context, f"{pool.vpls}_{count}", size)
@@ -70,7 +70,7 @@ class ClusteredDiscsPass(FramePass):
                 resources,
                 "clustered_discs/clustered_discs_restart",
                 {},
-                reads=(samples,),
+                reads=(f"{pool.starts} as vpl_samples",),
                 writes=(vpls,),
             ),
             ComputeProgram(

@@ -58,15 +58,18 @@ class LightWalksPass(FramePass):
         hierarchy: RayHierarchy,
         bounces: int | None,
         glowing: DiscPool | None,
+        disc_count: int,
         *,
         has_lamps: bool,
     ):
+        self._disc_count = disc_count
         self._hierarchy = hierarchy
         self._lamp_steps, self._glowing_steps = walk_steps(bounces)
         steps = max(self._lamp_steps if has_lamps else 0, self._glowing_steps if glowing else 0)
         self.sample_count = WALKS * steps
         """Samples that it leaves, dark ones included."""
         context = resources.context
+        resources["later_starts"] = context.buffer(reserve=disc_count * VPL_BYTES)
         resources["later_samples"] = context.buffer(reserve=self.sample_count * VPL_BYTES)
         shares = int(has_lamps) + int(glowing is not None)
         directions = np.repeat(walk_table(WALKS // shares)[:, 2:], shares, axis=0)
@@ -98,7 +101,7 @@ class LightWalksPass(FramePass):
             resources,
             "light_walks/walk_statistics",
             defines,
-            writes=("later_samples", "frame_statistics"),
+            writes=("later_samples", "later_starts", "frame_statistics"),
         )
 
     def draw(self, inputs: FrameInputs) -> None:
@@ -112,4 +115,9 @@ class LightWalksPass(FramePass):
             glowing_steps=self._glowing_steps,
             table_rotation=inputs.table_rotation,
         )
-        self._statistics.dispatch(1, walk_count=WALKS, moment_origin=inputs.records.moment_origin)
+        self._statistics.dispatch(
+            1,
+            walk_count=WALKS,
+            disc_count=self._disc_count,
+            moment_origin=inputs.records.moment_origin,
+        )

@@ -86,7 +86,7 @@ def _configs() -> tuple[dict[str, Any], ...]:
     full["quality"]["rsm_resolution"] = 512
     full["quality"]["budget"] = {"milliseconds": 16.0, "frame_size": [960, 540], "machine": "a GPU"}
     full["fit"] = {"status": "converged", "sentence": "12 steps."}
-    full["light"] = {"type": "spot", "cone": [0.1, 0.5], "of": {"name": "lamp"}}
+    full["light"] = {"bounces": 3, "sky_lights": 16}
     full["provenance"] = {"scene": "room.glb", "seed": 1, "loss": 0.25}
     older_names = {newer: older for older, newer in OLDER_NAMES.items()}
     parameters = {older_names.get(name, name): value for name, value in full["parameters"].items()}

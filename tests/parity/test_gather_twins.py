@@ -1,5 +1,7 @@
 """The surrogate's gather against the runtime's, on the same buffers."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,6 +12,7 @@ from point_vpls import point_vpls
 from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.files import read_scene
@@ -123,7 +126,7 @@ def test_tabulated_gather_is_close(gl_context, light):
 @pytest.mark.parametrize("light", ["spot", "directional"])
 def test_tabulated_gather_of_discs_is_close(gl_context, light):
     """The error is below 4 % for 32 discs, whose edges cross receivers between nodes of α; 0.3 % at α = 1."""
-    config = WITHOUT_MAPS.with_parameters(DISCS[1])
+    config = replace(WITHOUT_MAPS.with_parameters(DISCS[1]), light=ONE_BOUNCE)
     captured = Runtime(colored_room(), context=gl_context).capture(room_view(light), config)
     receivers, vpls = gather_inputs(captured)
     assert vpls.cells

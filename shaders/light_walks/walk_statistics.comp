@@ -26,9 +26,21 @@ uniform vec3 moment_origin;  // a point near the scene, from where sums of squar
 
 const float PI = 3.14159265358979;
 
-shared int lit_counts[WALK_GROUP_SIZE];
 shared vec4 sums_position[WALK_GROUP_SIZE];  // Σ flux · offset; Σ flux
 shared vec2 sums_rest[WALK_GROUP_SIZE];      // Σ flux · |offset|²; Σ flux of all first reflections
+
+// The sample that a disc starts at: the first reflection of a walk. In an open scene many walks leave at once, and a disc
+// that started at a dark sample would stay dark: it takes the next of the walks that are its own. So a walk that turns out
+// otherwise, by rounding, moves no other disc's start.
+VirtualPointLight start_of(int disc) {
+    for (int walk = disc % walk_count; walk < walk_count; walk += disc_count) {
+        VirtualPointLight one = later_samples[walk * WALK_STEPS];
+        if (one.normal_area.w > 0.0) {
+            return one;
+        }
+    }
+    return NO_VPL;
+}
 
 void main() {
     int lane = int(gl_LocalInvocationIndex);
@@ -74,35 +86,15 @@ void main() {
     // Samples of more flux count for more, as weights about 1 for a first reflection.
     float unit = max(sums_rest[0].y / float(walk_count), 1e-30);
     float footprint = WALK_SPREAD * scene_length * inversesqrt(float(walk_count));
-    // Each invocation takes a run of samples. In an open scene most are dark, and a disc that started there would stay
-    // dark: discs start at the first lit ones.
-    int samples = walk_count * WALK_STEPS;
-    int run = (samples + WALK_GROUP_SIZE - 1) / WALK_GROUP_SIZE;
-    int begin = min(lane * run, samples);
-    int end = min(begin + run, samples);
-    int lit = 0;
-    for (int i = begin; i < end; ++i) {
+    for (int i = lane; i < walk_count * WALK_STEPS; i += WALK_GROUP_SIZE) {
         float flux = mean_flux(later_samples[i].flux.rgb);
         later_samples[i].position_footprint.w = footprint;
         later_samples[i].normal_area.w = flux > 0.0 ? PI * footprint * footprint : 0.0;
         later_samples[i].flux.w = flux / unit;
-        lit += int(flux > 0.0);
     }
-    lit_counts[lane] = lit;
+    memoryBarrierBuffer();
     barrier();
-    int before = 0;
-    int all = 0;
-    for (int i = 0; i < WALK_GROUP_SIZE; ++i) {
-        before += i < lane ? lit_counts[i] : 0;
-        all += lit_counts[i];
-    }
-    for (int i = begin; i < end && before < disc_count; ++i) {
-        if (later_samples[i].normal_area.w > 0.0) {
-            later_starts[before] = later_samples[i];
-            before += 1;
-        }
-    }
-    for (int i = all + lane; i < disc_count; i += WALK_GROUP_SIZE) {
-        later_starts[i] = NO_VPL;
+    for (int disc = lane; disc < disc_count; disc += WALK_GROUP_SIZE) {
+        later_starts[disc] = start_of(disc);
     }
 }

@@ -18,7 +18,7 @@ SCENES = [
     ("cube2-steelribs/steelribs.obj", 45846, 1417, 0, 0, 0),
     ("bevy-mixedlightingexample/MixedLightingExample.gltf", 40898, 4.45, 3, 1, 0),
     ("bevy-irradiancevolumeexample/IrradianceVolumeExample.glb", 32, 57.5, 0, 0, 0),
-    ("bevy-depthoffieldexample/DepthOfFieldExample.glb", 10610, 9.21, 2, 1, 0),
+    ("bevy-depthoffieldexample/DepthOfFieldExample.glb", 10610, 9.21, 3, 1, 0),
     ("playcanvas-house/house.glb", 10497, 0.736, 1, 0, 0),
     ("babylon-marble-tower/marbleTower.gltf", 78972, 68.7, 3, 0, 0),
     ("playcanvas-chess-board/chess-board.glb", 178845, 436, 3, 0, 0),

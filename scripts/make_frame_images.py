@@ -13,9 +13,10 @@ from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.image_file import write_png
 from vpltune.renderer.files.srgb import srgb_from_linear
-from vpltune.renderer.frame.capture import octahedral_decode, read_image
+from vpltune.renderer.frame.capture import read_image
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
+from vpltune.renderer.gpu.octahedral import octahedral_decode
 from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.scene.dynamic_lights import DynamicLights
 from vpltune.renderer.scene.files import read_scene

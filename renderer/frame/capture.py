@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float32, Int32, UInt32
 
 from vpltune.renderer.frame.frame import Frame
 from vpltune.renderer.frame.visibility_map_layout import TEXEL_BYTES, VISIBILITY_CORNER_MASK
+from vpltune.renderer.gpu.octahedral import octahedral_decode
 from vpltune.renderer.gpu.resources import HOST_TEXTURE, Access, Resources
 from vpltune.renderer.scene.views import View, ray_directions_world
 
@@ -190,13 +191,3 @@ def read_image(resources: Resources, name: str) -> np.ndarray:
     shape = (texture.height, texture.width)
     values = values.reshape(shape if texture.components == 1 else (*shape, texture.components))
     return np.ascontiguousarray(values[::-1])
-
-
-def octahedral_decode(encoded: Float32[np.ndarray, "*shape 2"]) -> Float32[np.ndarray, "*shape 3"]:
-    """Unit vectors from two channels in [0, 1]. Twin: shaders/common/octahedral.glsl."""
-    p = encoded * np.float32(2.0) - np.float32(1.0)
-    z = 1.0 - np.abs(p).sum(axis=-1)
-    sign = np.where(p >= 0.0, np.float32(1.0), np.float32(-1.0))
-    folded = np.where((z < 0.0)[..., None], (1.0 - np.abs(p[..., ::-1])) * sign, p)
-    direction = np.concatenate([folded, z[..., None]], axis=-1)
-    return (direction / np.linalg.norm(direction, axis=-1, keepdims=True)).astype(np.float32)

@@ -32,6 +32,7 @@ from vpltune.renderer.frame.passes.reflective_shadow_map import ReflectiveShadow
 from vpltune.renderer.frame.passes.scene_statistics import SceneStatisticsPass
 from vpltune.renderer.frame.passes.screen_space_indirect import BLOCK as NEAR_FIELD_BLOCK
 from vpltune.renderer.frame.passes.screen_space_indirect import ScreenSpaceIndirectPass
+from vpltune.renderer.frame.passes.sky_light import SkyLightPass
 from vpltune.renderer.frame.passes.tone_mapping import ToneMappingPass
 from vpltune.renderer.frame.passes.virtual_point_lights import VirtualPointLightsPass, VplDensityPass
 from vpltune.renderer.frame.passes.vpl_gather import (
@@ -65,6 +66,7 @@ from vpltune.renderer.scene.light_faces import (
     light_records,
 )
 from vpltune.renderer.scene.scene import Light
+from vpltune.renderer.scene.sky_lights import SkyLights
 from vpltune.renderer.scene.sun_faces import SunGrid
 from vpltune.renderer.scene.views import View
 
@@ -82,6 +84,8 @@ class FrameSetup:
     bounces: int | None
     """Reflections before light reaches the receiver; None for all."""
     interleave: int
+    sky_count: int
+    """`light.sky_lights` of the config; 0 without a sky."""
     maps: VisibilityMapLayout
     prior: AutoPrior | None
     adaptation_frames: float
@@ -110,6 +114,7 @@ class FrameSetup:
             pools=pools,
             bounces=bounces,
             interleave=config.quality.interleave_for(pools.reflected, view.size),
+            sky_count=config.light.sky_lights if sky_lights else 0,
             maps=VisibilityMapLayout.of(config),
             prior=config.auto,
             adaptation_frames=config.quality.adaptation_frames,
@@ -126,12 +131,15 @@ class Frame:
         options: RuntimeOptions,
         hierarchy: RayHierarchy | None,
         glowing: GlowingTriangles | None,
+        sky: SkyLights,
     ):
         self.setup = setup
         self.scene = scene
         self.resources = scene.resources()
         self._make_targets()
         resources, rsm = self.resources, self.rsm
+        if hierarchy is not None:
+            hierarchy.add_to(resources)
         cells = setup.importance_cells
         self.light_pre_pass = LightPrePass(resources, options.light_path)
         self._seen: list[FramePass] = [
@@ -146,7 +154,12 @@ class Frame:
         if scene.has_blended:
             self._seen.append(BlendedShadowPass(resources, scene, rsm))
         punctual = "direct_irradiance" if glowing is None else "punctual_irradiance"
-        self._seen.append(DirectLightPass(resources, rsm, punctual, shadow_reads))
+        along_rays = len(sky.lights) - sky.narrow
+        lamps = "lamp_irradiance" if along_rays else punctual
+        self._seen.append(DirectLightPass(resources, rsm, lamps, along_rays, shadow_reads))
+        if along_rays:
+            assert hierarchy is not None, "light of the sky comes along rays"
+            self._seen.append(SkyLightPass(resources, hierarchy, sky, punctual))
         self._placed: list[FramePass] = self._placing_passes(options, hierarchy, glowing)
         """VPLs, what they see, and the parameters that a prior sets from it."""
         if setup.maps.size:
@@ -242,7 +255,8 @@ class Frame:
             resources["gbuffer_emission"] = self.gbuffer.emission
         for name in ("depth", "normal", "reflectance"):
             resources[f"rsm_{name}"] = getattr(self.rsm, name)
-        names = ["direct", "vpl", "near_field", "shared"] + ["punctual"] * (setup.pools.glowing > 0)
+        names = ["direct", "vpl", "near_field", "shared"]
+        names += ["punctual"] * (setup.pools.glowing > 0) + ["lamp"] * (setup.sky_count > 0)
         for name in names:
             resources[f"{name}_irradiance"] = create_irradiance_target(context, size)
         resources.alias("indirect_irradiance", "vpl_irradiance")
@@ -271,8 +285,6 @@ class Frame:
     ) -> list[FramePass]:
         """The passes that place the VPLs of each pool."""
         resources, setup, pools = self.resources, self.setup, self.setup.pools
-        if hierarchy is not None:
-            hierarchy.add_to(resources)
         has_lamps = setup.face_count > 0
         emitting = None
         if glowing is not None:

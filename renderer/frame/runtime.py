@@ -25,8 +25,8 @@ from vpltune.renderer.gpu.ray_hierarchy import RayHierarchy
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
 from vpltune.renderer.scene.animation import Pose
 from vpltune.renderer.scene.dynamic_lights import DynamicLights, scaled_records
-from vpltune.renderer.scene.scene import Light, Scene, scaled
-from vpltune.renderer.scene.sky_lights import sky_lights
+from vpltune.renderer.scene.scene import Scene, scaled
+from vpltune.renderer.scene.sky_lights import SkyLights, sky_lights
 from vpltune.renderer.scene.sun_faces import nested_face_count
 from vpltune.renderer.scene.views import View, scaled_view
 from vpltune.renderer.scene.working_scale import working_scale
@@ -69,7 +69,7 @@ class Runtime:
         self._scale = working_scale(scene)
         self._scene = scene = scaled(scene, self._scale) if self._scale != 1.0 else scene
         self.scene_buffers = SceneBuffers(self._context, scene)
-        self._skies: dict[int, tuple[Light, ...]] = {}
+        self._skies: dict[int, SkyLights] = {}
         self._glowing = GlowingTriangles(self._context, scene, self.scene_buffers)
         self._hierarchy: RayHierarchy | None = None
         self._nested_faces = nested_face_count(scene)
@@ -264,7 +264,7 @@ class Runtime:
 
     def _tone_mapped(self, radiance: np.ndarray, exposure: float | None) -> Frame:
         height, width = radiance.shape[:2]
-        frame = self._frame(FrameSetup((width, height), 1, 1, 1, VplPools(1), 1, 1, NO_MAPS, None, 0.0))
+        frame = self._frame(FrameSetup((width, height), 1, 1, 1, VplPools(1), 1, 1, 0, NO_MAPS, None, 0.0))
         pixels = np.ones((height, width, 4), np.float32)
         pixels[..., : radiance.shape[2]] = radiance
         frame.texture("radiance").write(np.ascontiguousarray(pixels[::-1]).tobytes())
@@ -309,7 +309,7 @@ class Runtime:
                 view,
                 frame.setup.rsm_resolution,
                 self._nested_faces,
-                self._sky(config),
+                self._sky(frame.setup.sky_count).lights,
                 snapped=self.options.rsm_snapping,
             ),
             parameters=config.parameters,
@@ -331,22 +331,24 @@ class Runtime:
         while len(self._frames) >= KEPT_FRAMES:
             self._frames.popitem(last=False)
         free_dropped(self._context)
-        casts_rays = setup.maps.size > 0 or setup.pools.later > 0
+        sky = self._sky(setup.sky_count)
+        casts_rays = setup.maps.size > 0 or setup.pools.later > 0 or len(sky.ray_flux) > 0
         if casts_rays and self._hierarchy is None:
             self._hierarchy = RayHierarchy(self._context, self._scene, self.scene_buffers)
         hierarchy = self._hierarchy if casts_rays else None
         glowing = self._glowing if setup.pools.glowing else None
-        frame = self._frames[setup] = Frame(self.scene_buffers, setup, self.options, hierarchy, glowing)
+        frame = Frame(self.scene_buffers, setup, self.options, hierarchy, glowing, sky)
+        self._frames[setup] = frame
         return frame
 
     def _setup(self, view: View, config: TunedConfig) -> FrameSetup:
-        glows, sky = self._glowing.count > 0, len(self._sky(config))
+        glows, sky = self._glowing.count > 0, len(self._sky(config.light.sky_lights).lights)
         return FrameSetup.of(view, config, self._nested_faces, glows=glows, sky_lights=sky)
 
-    def _sky(self, config: TunedConfig) -> tuple[Light, ...]:
-        environment, count = self._scene.environment, config.light.sky_lights
-        if environment is None:
-            return ()
+    def _sky(self, count: int) -> SkyLights:
+        environment = self._scene.environment
+        if environment is None or count == 0:
+            return SkyLights()
         if count not in self._skies:
             self._skies[count] = sky_lights(environment, count)
         return self._skies[count]

@@ -1,29 +1,27 @@
-"""An environment as a few directional lights, each for the light of one part of the sky.
+"""An environment as lights with shadow maps, for what they send on, and as rays, for direct light.
 
-The parts are made by median cut (Debevec 2005, "A Median Cut Algorithm for Light Probe Sampling"), and then
-moved by Lloyd iterations on the sphere, so that each is compact. A light has the irradiance of its part, from
-the middle of the part's light. Parts that a surface sees half of would make an error of some percent; so all
-lights are weighted a little, to give surfaces of every orientation the irradiance of the sky itself.
+Each part of the sky is a directional light from the middle of its light: what its reflective shadow map shows
+becomes VPLs. Surfaces that see half of a part would err by some percent; so all lights are weighted a little,
+to give surfaces of every orientation the irradiance of the sky itself.
+
+Shadows from so few directions would be hard, and so direct light comes along rays: each part is cut again.
+Only the light of narrow parts, such as a sun's, has its shadows from its map.
 """
 
+from dataclasses import dataclass, field
+
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Bool, Float32, Float64, Int64
 
-from vpltune.renderer.scene.environment import Environment, solid_angles, texel_directions
+from vpltune.renderer.scene.environment import Environment
 from vpltune.renderer.scene.scene import Light
+from vpltune.renderer.scene.sky_parts import SkyParts, median_cut, part_middles, sky_parts
 
-ROWS = 64
-"""Rows of the map that is cut, and half its columns: 2.8° each. A choice: a part of 1/256 of the sky has 32
-texels."""
-_ITERATIONS = 8
-"""Lloyd iterations. A choice: the parts of an even sky then differ in size by less than a tenth."""
-
-_NARROWEST = 0.1
-"""Angle in radians between parts that are joined: a sun is one light. A choice, 5.7°; 256 even parts are 13°
-apart."""
-_BELOW = 0.25
-"""What light from below the horizon counts for when the sky is cut: most scenes have a ground that hides it.
-A choice: a fifth of the lights of an even sky are there."""
+RAYS_OF_A_PART = 32
+"""Directions that a part is cut into, at most. A choice: 1,024 for 32 parts, of which a pixel takes 16."""
+_NARROW = 0.06
+"""Widest half angle in radians of a part with hard shadows. A choice, 3.4°: about one texel of the map
+that is cut, which is all that is known of a sun's size."""
 _AXES_COUNT = 30.0
 """How much more surfaces along the six axes count, as most floors and walls are. A choice."""
 _ORIENTATIONS = 400
@@ -34,51 +32,75 @@ _MOST_CHANGE = 0.3
 """Largest change of a factor. A choice."""
 
 
-def sky_lights(environment: Environment, count: int) -> tuple[Light, ...]:
-    """At most `count` directional lights that stand for the environment; fewer where it has fewer lit texels.
+@dataclass(frozen=True, eq=False)
+class SkyLights:
+    """What stands for a sky."""
 
-    Intensities are W/m² on a surface square to the light.
-    """
-    radiance = _resampled(environment.radiance.astype(np.float64))
-    height, width, _ = radiance.shape
-    directions = texel_directions(height, width).reshape(-1, 3)
-    flux = (radiance * solid_angles(height, width)[:, None, None]).reshape(-1, 3)
-    power = flux.mean(axis=1)
-    lit = power > 0.0
-    directions, flux, power = directions[lit], flux[lit], power[lit]
-    if not len(power):
-        return ()
-    owner = _median_cut(directions, np.where(directions[:, 1] < 0.0, _BELOW * power, power), count)
-    for _ in range(_ITERATIONS):
-        middles = _middles(directions, power, owner)
-        owner = np.unique((directions @ middles.T).argmax(axis=1), return_inverse=True)[1]
-    owner = _joined(_middles(directions, power, owner), np.bincount(owner, power))[owner]
-    middles = _middles(directions, power, owner)
-    weights = _weights(directions, power, middles, np.bincount(owner, power))
-    return tuple(
-        Light("directional", weight * flux[owner == i].sum(axis=0), direction_world=-middle, name="sky")
-        for i, (weight, middle) in enumerate(zip(weights, middles, strict=True))
+    lights: tuple[Light, ...] = ()
+    """Directional; intensities are W/m² on a surface square to the light. The narrow ones come first."""
+    narrow: int = 0
+    """How many are narrow: their direct light has shadows from their maps, and comes along no ray."""
+    ray_towards: Float32[np.ndarray, "rays 3"] = field(default_factory=lambda: np.zeros((0, 3), np.float32))
+    """Unit vectors towards the light of the other parts, part by part; parts that follow are neighbours."""
+    ray_flux: Float32[np.ndarray, "rays 3"] = field(default_factory=lambda: np.zeros((0, 3), np.float32))
+    """W/m² on a surface square to each."""
+
+    def open_irradiance(self, normals: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, "n 3"]:
+        """W/m² along the rays on surfaces with these unit normals that nothing hides."""
+        return np.maximum(normals @ self.ray_towards.T, 0.0) @ self.ray_flux
+
+
+def sky_lights(environment: Environment, count: int) -> SkyLights:
+    """What stands for an environment: at most `count` lights, fewer where it has fewer lit texels."""
+    parts = sky_parts(environment, count)
+    if not parts.count:
+        return SkyLights()
+    middles = parts.middles()
+    weights = _weights(parts, middles)
+    narrow = _narrow(parts, middles)
+    fluxes = [weight * parts.flux[parts.owner == i].sum(axis=0) for i, weight in enumerate(weights)]
+    # A stable order: the narrow ones first.
+    lights = tuple(
+        Light("directional", fluxes[i], direction_world=-middles[i], name="sky")
+        for i in np.argsort(~narrow, kind="stable")
     )
+    towards, flux = _rays(parts, narrow)
+    return SkyLights(lights, int(narrow.sum()), towards, flux)
 
 
-def _joined(middles: Float64[np.ndarray, "parts 3"], powers: Float64[np.ndarray, " parts"]) -> np.ndarray:
-    """For each part the new number: the cut may have halved a sun, whose parts become one again."""
-    kept: list[int] = []
-    number = np.zeros(len(powers), np.int64)
-    for part in np.argsort(-powers, kind="stable"):
-        near = [k for k, other in enumerate(kept) if middles[other] @ middles[part] > np.cos(_NARROWEST)]
-        if not near:
-            kept.append(int(part))
-        number[part] = near[0] if near else len(kept) - 1
-    return number
+def _narrow(parts: SkyParts, middles: Float64[np.ndarray, "parts 3"]) -> Bool[np.ndarray, " parts"]:
+    """Whether a part is narrow, by the even disc of sky with the same mean cosine, (1 + cos θ)/2."""
+    cosines = (parts.directions * middles[parts.owner]).sum(axis=1)
+    mean = np.bincount(parts.owner, parts.power * cosines) / np.bincount(parts.owner, parts.power)
+    return 2.0 * mean - 1.0 >= np.cos(_NARROW)
 
 
-def _weights(
-    directions: Float64[np.ndarray, "texels 3"],
-    power: Float64[np.ndarray, " texels"],
-    middles: Float64[np.ndarray, "parts 3"],
-    powers: Float64[np.ndarray, " parts"],
-) -> Float64[np.ndarray, " parts"]:
+def _rays(
+    parts: SkyParts, narrow: Bool[np.ndarray, " parts"]
+) -> tuple[Float32[np.ndarray, "rays 3"], Float32[np.ndarray, "rays 3"]]:
+    towards: list[np.ndarray] = [np.zeros((0, 3))]
+    flux: list[np.ndarray] = [np.zeros((0, 3))]
+    for part in _chained(parts.middles(), np.flatnonzero(~narrow)):
+        own = parts.owner == part
+        directions, own_flux, power = parts.directions[own], parts.flux[own], parts.power[own]
+        piece = median_cut(directions, power, RAYS_OF_A_PART)
+        towards.append(part_middles(directions, power, piece))
+        flux.append(np.stack([np.bincount(piece, own_flux[:, channel]) for channel in range(3)], axis=1))
+    return np.concatenate(towards).astype(np.float32), np.concatenate(flux).astype(np.float32)
+
+
+def _chained(middles: Float64[np.ndarray, "parts 3"], chosen: Int64[np.ndarray, " chosen"]) -> list[int]:
+    """The chosen parts, each near the one before, so that every second of them covers the sky evenly."""
+    left = [int(part) for part in chosen]
+    chain: list[int] = []
+    while left:
+        nearest = max(left, key=lambda part: middles[part] @ middles[chain[-1]]) if chain else left[0]
+        left.remove(nearest)
+        chain.append(nearest)
+    return chain
+
+
+def _weights(parts: SkyParts, middles: Float64[np.ndarray, "parts 3"]) -> Float64[np.ndarray, " parts"]:
     """Factors of the lights' power, by least squares over the irradiance of surfaces of many orientations.
 
     Ridge regression (Hoerl and Kennard 1970) towards 1.
@@ -95,8 +117,8 @@ def _weights(
         hidden = [np.maximum(towards @ normal, 0.0) * (towards @ half > 0.0) for normal, half in beside]
         return np.concatenate([open_ones, np.stack(hidden)])
 
-    wanted = seen(directions) @ power
-    given = seen(middles) * powers
+    wanted = seen(parts.directions) @ parts.power
+    given = seen(middles) * np.bincount(parts.owner, parts.power)
     scale = max(wanted.mean(), 1e-300)
     matrix, missing = given / scale, (wanted - given.sum(axis=1)) / scale
     weighted = matrix.T * (counts / counts.sum())
@@ -110,57 +132,3 @@ def _even_directions(count: int) -> Float64[np.ndarray, "count 3"]:
     angle = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
     radius = np.sqrt(1.0 - y * y)
     return np.stack([radius * np.cos(angle), y, radius * np.sin(angle)], axis=1)
-
-
-def _resampled(radiance: Float64[np.ndarray, "height width 3"]) -> Float64[np.ndarray, "rows columns 3"]:
-    """The map with `ROWS` rows: the means over their solid angle."""
-    height, width, _ = radiance.shape
-    rows = _overlaps(
-        np.cos(np.pi * np.arange(height + 1) / height), np.cos(np.pi * np.arange(ROWS + 1) / ROWS)
-    )
-    columns = _overlaps(np.arange(width + 1) / width, np.arange(2 * ROWS + 1) / (2 * ROWS))
-    return np.einsum("rh,hwc,kw->rkc", rows, radiance, columns, optimize=True)
-
-
-def _overlaps(edges: np.ndarray, wanted: np.ndarray) -> Float64[np.ndarray, "wanted given"]:
-    """The share of each given interval in each wanted one, in parts of the wanted one."""
-    low = np.minimum(edges[:-1], edges[1:]), np.minimum(wanted[:-1], wanted[1:])
-    high = np.maximum(edges[:-1], edges[1:]), np.maximum(wanted[:-1], wanted[1:])
-    common = np.minimum(high[0], high[1][:, None]) - np.maximum(low[0], low[1][:, None])
-    return np.maximum(common, 0.0) / (high[1] - low[1])[:, None]
-
-
-def _median_cut(
-    directions: Float64[np.ndarray, "texels 3"], power: Float64[np.ndarray, " texels"], count: int
-) -> np.ndarray:
-    """The part of each texel: that with the most power is halved across its longest side, over and over."""
-    owner = np.zeros(len(power), np.int64)
-    parts = 1
-    can_be_cut = {0}
-    while parts < count and can_be_cut:
-        sums = np.bincount(owner, power, parts)
-        largest = max(sorted(can_be_cut), key=lambda part: sums[part])
-        own = np.flatnonzero(owner == largest)
-        if len(own) < 2:
-            can_be_cut.discard(largest)
-            continue
-        axis = np.ptp(directions[own], axis=0).argmax()
-        own = own[np.argsort(directions[own, axis], kind="stable")]
-        running = np.cumsum(power[own])
-        first = int(np.clip(np.searchsorted(running, 0.5 * running[-1]) + 1, 1, len(own) - 1))
-        owner[own[first:]] = parts
-        can_be_cut.add(parts)
-        parts += 1
-    return owner
-
-
-def _middles(
-    directions: Float64[np.ndarray, "texels 3"], power: Float64[np.ndarray, " texels"], owner: np.ndarray
-) -> Float64[np.ndarray, "parts 3"]:
-    """The unit vector to the middle of each part's light; of one whose vectors cancel, its first texel."""
-    parts = int(owner.max()) + 1
-    sums = np.stack([np.bincount(owner, power * directions[:, axis], parts) for axis in range(3)], axis=1)
-    first = directions[np.unique(owner, return_index=True)[1]]
-    total = np.bincount(owner, power, parts)
-    length = np.linalg.norm(sums, axis=1)
-    return np.where((length > 1e-6 * total)[:, None], sums / np.maximum(length, 1e-300)[:, None], first)

@@ -6,11 +6,11 @@ import moderngl
 import numpy as np
 from jaxtyping import Float16, Float32, UInt16
 
-from vpltune.renderer.frame.capture import octahedral_decode
 from vpltune.renderer.frame.frame import Frame
 from vpltune.renderer.frame.frame_pass import FrameInputs
 from vpltune.renderer.frame.point_table import poisson_disc
 from vpltune.renderer.gpu.gpu_program import RasterProgram
+from vpltune.renderer.gpu.octahedral import octahedral_decode
 from vpltune.renderer.gpu.render_targets import GBUFFER_READS, create_irradiance_target
 from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.gpu.shader_library import set_uniforms

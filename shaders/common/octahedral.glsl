@@ -1,7 +1,7 @@
 // The octahedral map: unit vectors in two channels of [0, 1]. With 16 bits a channel, the angular error stays below
 // 6e-5 rad.
 //
-// Provides: `octahedral_encode`, `octahedral_decode`. Twin of the latter: renderer/frame/capture.py.
+// Provides: `octahedral_encode`, `octahedral_decode`. Twin of the latter: renderer/gpu/octahedral.py.
 // Source: Cigolle et al. 2014, section 3.
 
 // The sign of each component, 1 for 0.

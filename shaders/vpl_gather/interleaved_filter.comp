@@ -4,8 +4,8 @@
 // Reads: G-buffer, the interleaved image; with RELIGHT, the direction of its light; with ADD_BASE, an image to add.
 // Writes: irradiance; with REFINE, the list of pixels that need a full gather.
 // Constants: INTERLEAVE, RELIGHT, REFINE, ADD_BASE; PLANE_TOLERANCE [pixel footprints], NORMAL_COSINE, LEAST_COSINE,
-// LARGEST_RELIGHTING, LEAST_VARIANCE, LEAST_ABSENT and LARGEST_ERROR of renderer/frame/passes/interleaved_filter.py.
-// Python: renderer/frame/passes/interleaved_filter.py.
+// LARGEST_RELIGHTING, LEAST_VARIANCE, LEAST_ABSENT and LARGEST_ERROR of renderer/frame/irradiance_filter.py.
+// Python: renderer/frame/irradiance_filter.py.
 // Source: Keller and Heidrich 2001 (the discontinuity buffer); Segovia et al. 2006.
 //
 // The window is n + 1 pixels wide, n = INTERLEAVE. Its outer pixels count half, so it is centred and each of the n²

@@ -10,12 +10,13 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
-from vpltune.renderer.frame.capture import CapturedFrame, octahedral_decode, read_image
+from vpltune.renderer.frame.capture import CapturedFrame, read_image
 from vpltune.renderer.frame.frame_pass import FrameInputs
-from vpltune.renderer.frame.passes import interleaved_filter
+from vpltune.renderer.frame.irradiance_filter import IrradianceFilter
 from vpltune.renderer.frame.passes.interleaved_filter import InterleavedFilterPass, NearFieldFilterPass
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.gpu.camera_uniforms import camera_uniforms
+from vpltune.renderer.gpu.octahedral import octahedral_decode
 from vpltune.renderer.gpu.render_targets import (
     EMPTY_DISPATCH,
     create_direction_target,
@@ -155,7 +156,7 @@ def listed(resources: Resources) -> int:
 def filtered(gl_context, interleave, image, depth_and_normal, refine=False, light=None):
     """An image through the filter, and the number of pixels that it lists; `light` None does not relight."""
     resources = drawn_gbuffer(gl_context, image, depth_and_normal, light)
-    interleaved_filter._Filter(
+    IrradianceFilter(
         resources,
         interleave,
         reads=("shared_irradiance as interleaved", "shared_direction as direction"),

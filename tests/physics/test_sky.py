@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from built_scenes import quad, scene_of
+from polygon_irradiance import polygon_irradiance
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.light_settings import LightSettings
@@ -51,11 +52,20 @@ def test_open_ground_receives_pi_times_the_radiance(gl_context, scale):
 
 
 def test_under_a_half_infinite_wall_half_the_sky_is_left(gl_context):
-    """At its foot a wall hides half of the sky, and so half of the irradiance. 2 %, and 20 m high for 1 m."""
+    """At its foot a wall hides half of the sky, and half of the irradiance; further off, what 80 × 40 m hide.
+
+    The mean to 2 %.
+    """
+
     ground = quad((-10, 0, -10), (0, 0, 20), (20, 0, 0))
     scene = under_sky([ground, quad((-40, 0, 0), (80, 0, 0), (0, 40, 0))])
-    got = direct_over_radiance(gl_context, scene, view_from((0.0, 2.0, 1.2), (0.0, 0.0, 1.0), 0.3), 64)
-    assert got.mean() == pytest.approx(np.pi / 2, rel=0.03)
+    view = view_from((0.0, 2.0, 1.2), (0.0, 0.0, 1.0), 0.3)
+    frame = Runtime(scene, context=gl_context).capture(view, config_of(64), maps=False)
+    wall = np.array([[-40, 0, 0], [40, 0, 0], [40, 40, 0], [-40, 40, 0]], np.float64)
+    hidden = polygon_irradiance(wall, frame.position_world[frame.valid], np.array([0.0, 1.0, 0.0]))
+    got = frame.direct_irradiance[frame.valid][:, 0] / RADIANCE[0]
+    assert (np.pi - hidden).mean() == pytest.approx(np.pi / 2, rel=0.03)
+    assert got.mean() == pytest.approx((np.pi - hidden).mean(), rel=0.02)
 
 
 def test_the_floor_of_a_square_well_sees_its_opening(gl_context):
@@ -68,7 +78,7 @@ def test_the_floor_of_a_square_well_sees_its_opening(gl_context):
     ]
     scene = under_sky([quad((-1, 0, -1), (0, 0, 2), (2, 0, 0)), *walls])
     got = direct_over_radiance(gl_context, scene, view_from((0.0, 3.9, 0.001)), 64)
-    assert got.mean() == pytest.approx(0.1998 * np.pi, rel=0.03)
+    assert got.mean() == pytest.approx(0.1998 * np.pi, rel=0.02)
 
 
 def test_the_sky_is_seen_where_nothing_else_is(gl_context):
@@ -86,10 +96,69 @@ def test_the_sky_is_seen_where_nothing_else_is(gl_context):
         np.testing.assert_allclose(image[1, 1], radiance[row, column], rtol=1e-6)
 
 
+def test_light_through_a_window_is_as_soft_as_the_sky_is_wide(gl_context):
+    """On the floor of a room of 4 × 2 × 4 with one window: the irradiance of the window's rectangle.
+
+    The mean to 3 %; pointwise 0.25 RMS of the mean: a window of 8 pixels joins 1,024 rays, of which a place
+    sees tens. With hard shadows from 32 directions there were 32 windows on the floor, and it was 1.5.
+    """
+    low, high, side = 0.8, 1.6, 0.5
+    walls = [
+        quad((-2, 0, -2), (0, 0, 4), (4, 0, 0)),
+        quad((-2, 2, -2), (4, 0, 0), (0, 0, 4)),
+        quad((-2, 0, -2), (4, 0, 0), (0, 2, 0)),
+        quad((-2, 0, 2), (0, 2, 0), (4, 0, 0)),
+        quad((-2, 0, -2), (0, 2, 0), (0, 0, 4)),
+        quad((2, 0, -2), (0, 0, 4), (0, low, 0)),
+        quad((2, high, -2), (0, 0, 4), (0, 2 - high, 0)),
+        quad((2, low, -2), (0, 0, 2 - side), (0, high - low, 0)),
+        quad((2, low, side), (0, 0, 2 - side), (0, high - low, 0)),
+    ]
+    scene = under_sky(walls)
+    view = replace(view_from((-1.0, 1.8, 0.0), (0.6, 0.0, 0.0), 1.0), size=(96, 96))
+    frame = Runtime(scene, context=gl_context).capture(view, config_of(32), maps=False)
+    floor = frame.valid & (frame.position_world[..., 1] < 0.01)
+    window = np.array([[2, low, -side], [2, high, -side], [2, high, side], [2, low, side]], np.float64)
+    expected = polygon_irradiance(window, frame.position_world[floor], np.array([0.0, 1.0, 0.0]))
+    got = frame.direct_irradiance[floor][:, 0] / RADIANCE[0]
+    assert floor.sum() > 2000
+    assert got.mean() == pytest.approx(expected.mean(), rel=0.03)
+    assert np.sqrt(((got - expected) ** 2).mean()) < 0.25 * expected.mean()
+
+
+def test_under_a_table_it_is_dark_by_what_the_table_hides(gl_context):
+    """A square of side 2 at height 1 over open ground: π less its form factor. Pointwise 5 % of the mean."""
+    ground = quad((-10, 0, -10), (0, 0, 20), (20, 0, 0))
+    scene = under_sky([ground, quad((-1, 1, -1), (2, 0, 0), (0, 0, 2))])
+    view = replace(view_from((0.0, 0.5, 3.0), (0.0, 0.0, 0.0), 0.8), size=(96, 96))
+    frame = Runtime(scene, context=gl_context).capture(view, config_of(32), maps=False)
+    floor = frame.valid & (frame.position_world[..., 1] < 0.01)
+    table = np.array([[-1, 1, -1], [1, 1, -1], [1, 1, 1], [-1, 1, 1]], np.float64)
+    hidden = polygon_irradiance(table, frame.position_world[floor], np.array([0.0, 1.0, 0.0]))
+    got, expected = frame.direct_irradiance[floor][:, 0] / RADIANCE[0], np.pi - hidden
+    assert got.mean() == pytest.approx(expected.mean(), rel=0.015)
+    assert np.sqrt(((got - expected) ** 2).mean()) < 0.05 * expected.mean()
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_rays_and_narrow_lights_have_all_of_the_light(seed):
+    """Of any map, to the rounding of float32: what is not a narrow part's comes along rays."""
+    rng = np.random.default_rng(seed)
+    radiance = rng.random((64, 128, 3)).astype(np.float32)
+    radiance[16, 30] += 1e5 * (seed == 1)
+    sky = sky_lights(Environment(radiance), 24)
+    assert sky.narrow == (seed == 1)
+    flux = (radiance * solid_angles(64, 128)[:, None, None]).sum(axis=(0, 1))
+    narrow = sum((light.intensity for light in sky.lights[: sky.narrow]), np.zeros(3))
+    # The narrow light's own weight may change it by a percent; the rest has none.
+    np.testing.assert_allclose(sky.ray_flux.sum(axis=0) + narrow, flux, rtol=1e-5 if seed == 0 else 0.02)
+    np.testing.assert_allclose(np.linalg.norm(sky.ray_towards, axis=1), 1.0, rtol=1e-6)
+
+
 def test_an_even_sky_is_even_for_every_orientation():
     """With 32 lights: within 6 % for surfaces of 500 orientations, where a surface's horizon may run through
     a light's part of the sky, and within 2 % along the axes, for which the lights are weighted."""
-    lights = sky_lights(even_sky(RADIANCE), 32)
+    lights = sky_lights(even_sky(RADIANCE), 32).lights
     towards = np.stack([-light.direction_world for light in lights])
     power = np.array([light.intensity[0] for light in lights])
     normals = np.random.default_rng(1).normal(size=(500, 3))
@@ -103,7 +172,7 @@ def test_an_even_sky_is_even_for_every_orientation():
 def test_a_sun_in_the_map_is_one_light_of_its_flux():
     radiance = np.full((32, 64, 3), 1e-3, np.float32)
     radiance[6, 20] = 1e4
-    lights = sky_lights(Environment(radiance), 16)
+    lights = sky_lights(Environment(radiance), 16).lights
     sun = max(lights, key=lambda light: light.intensity.mean())
     flux = 1e4 * solid_angles(32, 64)[6]
     assert sun.intensity.mean() == pytest.approx(flux, rel=0.02)
@@ -113,6 +182,6 @@ def test_a_sun_in_the_map_is_one_light_of_its_flux():
 
 @pytest.mark.parametrize("count", [1, 2, 7, 256])
 def test_never_more_lights_than_asked_for(count):
-    lights = sky_lights(even_sky(RADIANCE), count)
-    assert 1 <= len(lights) <= count
-    assert sky_lights(even_sky((0.0, 0.0, 0.0)), count) == ()
+    assert 1 <= len(sky_lights(even_sky(RADIANCE), count).lights) <= count
+    dark = sky_lights(even_sky((0.0, 0.0, 0.0)), count)
+    assert (dark.lights, dark.narrow, len(dark.ray_flux)) == ((), 0, 0)

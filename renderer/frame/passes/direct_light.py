@@ -14,15 +14,22 @@ from vpltune.renderer.gpu.resources import Resources
 class DirectLightPass(FramePass):
     """G-buffer, RSM, light accumulation → irradiance of the punctual lights, in the texture `target`.
 
-    `shadow_reads` names the shadow maps of a scene with blended surfaces.
+    `along_rays` lights are left out, the last ones: parts of a sky. `shadow_reads` names the shadow maps of a
+    scene with blended surfaces.
     """
 
     name = "direct_light"
 
     def __init__(
-        self, resources: Resources, rsm: ReflectiveShadowMap, target: str, shadow_reads: tuple[str, ...] = ()
+        self,
+        resources: Resources,
+        rsm: ReflectiveShadowMap,
+        target: str,
+        along_rays: int = 0,
+        shadow_reads: tuple[str, ...] = (),
     ):
         self._rsm = rsm
+        self._along_rays = along_rays
         self._groups = pixel_groups(resources.texture(target))
         self._program = ComputeProgram(
             resources,
@@ -38,6 +45,6 @@ class DirectLightPass(FramePass):
             *self._groups,
             **inputs.camera.uniforms,
             **self._rsm.uniforms,
-            light_count=inputs.light_count,
+            light_count=inputs.light_count - self._along_rays,
             accumulation_unit=inputs.accumulation_unit,
         )

@@ -18,12 +18,12 @@ from vector_file import (
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.parameter_block import parameter_bytes
-from vpltune.renderer.frame.capture import octahedral_decode
 from vpltune.renderer.frame.disc_samples import DEFINES
 from vpltune.renderer.frame.passes.reflective_shadow_map import ReflectiveShadowMapPass
 from vpltune.renderer.frame.passes.virtual_point_lights import VirtualPointLightsPass, VplDensityPass
 from vpltune.renderer.frame.passes.vpl_importance import DEFINES as IMPORTANCE_DEFINES
 from vpltune.renderer.gpu.gpu_program import ComputeProgram
+from vpltune.renderer.gpu.octahedral import octahedral_decode
 from vpltune.renderer.gpu.render_targets import RSM_READS, ReflectiveShadowMap, create_reflective_shadow_map
 from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers

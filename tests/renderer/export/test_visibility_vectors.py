@@ -7,9 +7,9 @@ from glsl_results import glsl_results
 from vector_file import PI, VECTORS, boxes, buffer_of, inputs_of, light_of, vpl_rows
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
-from vpltune.renderer.frame.capture import octahedral_decode
 from vpltune.renderer.frame.passes.vpl_visibility_maps import VplVisibilityMapsPass
 from vpltune.renderer.frame.visibility_map_layout import VISIBILITY_CORNER_MASK, VisibilityMapLayout
+from vpltune.renderer.gpu.octahedral import octahedral_decode
 from vpltune.renderer.gpu.ray_hierarchy import RayHierarchy
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
 from vpltune.tuner.surrogate.virtual_point_lights import Receivers, VirtualPointLights

@@ -1,0 +1,85 @@
+// Sky light: irradiance from the sky along rays, for the interleaved filter.
+//
+// Reads: G-buffer, ray hierarchy, sky rays, open irradiance. Writes: irradiance [W/m²], alpha 1 where a surface is.
+// Constants: SKY_LIFT, OPEN_NODES. Python: renderer/frame/passes/sky_light.py.
+//
+// The rays are shared out among the 8×8 pixels of a block: each pixel takes every 64th. A window of the filter holds each
+// ray once, so that what it shows has shadows from all of them. What a pixel gets is a ratio: the share of its own rays'
+// light that arrives, of all that would arrive in the open. So open places have no noise, nor do borders of the image.
+#include "common/gbuffer.glsl"
+#include "common/ray_hierarchy.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(rgba32f, binding = IRRADIANCE_IMAGE) writeonly uniform image2D out_irradiance;
+
+struct SkyRay {
+    vec4 towards;  // unit, in the world; w unused
+    vec4 flux;     // [W/m²] on a surface square to the ray; w unused
+};
+
+layout(std430, binding = SKY_RAYS_BINDING) readonly buffer SkyRays {
+    SkyRay sky_rays[];  // 32 for each part of the sky, fewer for parts of few texels
+};
+
+layout(std430, binding = SKY_OPEN_BINDING) readonly buffer SkyOpen {
+    vec4 sky_open[];  // [OPEN_NODES, OPEN_NODES] irradiance [W/m²] in the open, at nodes of the octahedral map of normals
+};
+
+uniform float longest;  // the scene's diagonal [world units]
+uniform int ray_count;
+
+const int BLOCK_PIXELS = 64;  // 8 × 8: BLOCK of renderer/frame/passes/sky_light.py
+
+// Irradiance in the open on a surface with this normal.
+vec3 open_irradiance(vec3 normal) {
+    vec2 place = octahedral_encode(normal) * float(OPEN_NODES - 1);
+    ivec2 node = clamp(ivec2(place), ivec2(0), ivec2(OPEN_NODES - 2));
+    vec2 blend = place - vec2(node);
+    int at = node.y * OPEN_NODES + node.x;
+    return mix(
+        mix(sky_open[at].rgb, sky_open[at + 1].rgb, blend.x),
+        mix(sky_open[at + OPEN_NODES].rgb, sky_open[at + OPEN_NODES + 1].rgb, blend.x), blend.y);
+}
+
+// A pixel's place in its block, in [0, 64): neighbours take other parts of the sky, and the next of them other rays of
+// the same parts, in the order of a Bayer matrix.
+int place_in_block(ivec2 pixel) {
+    ivec2 part = pixel & 1;
+    ivec2 ray = (pixel >> 1) & 3;
+    int across = ray.x ^ ray.y;
+    int order = (across & 1) << 3 | (ray.y & 1) << 2 | (across & 2) | ray.y >> 1;
+    return (part.x | part.y << 1) * 16 + order;
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(pixel, imageSize(out_irradiance)))) {
+        return;
+    }
+    Receiver receiver = gbuffer_receiver(pixel);
+    vec3 irradiance = vec3(0.0);
+    if (receiver.valid) {
+        float away = max(longest, distance(camera_to_world[3].xyz, receiver.position_world));
+        vec3 origin = receiver.position_world + receiver.normal_world * (SKY_LIFT * away);
+        vec3 arriving = vec3(0.0);
+        vec3 sent = vec3(0.0);
+        for (int i = place_in_block(pixel); i < ray_count; i += BLOCK_PIXELS) {
+            vec3 towards = sky_rays[i].towards.xyz;
+            float cosine = dot(receiver.normal_world, towards);
+            if (cosine <= 0.0) {
+                continue;
+            }
+#ifdef RAYS_MEET_HOLES
+            ray_seed = uint(i) ^ uint(pixel.y * 65536 + pixel.x);
+#endif
+            vec3 light = sky_rays[i].flux.rgb * cosine;
+            sent += light;
+            if (ray_hit(origin, towards, longest).triangle == RAY_NO_TRIANGLE) {
+                arriving += light;
+            }
+        }
+        irradiance = open_irradiance(receiver.normal_world) * arriving / max(sent, vec3(1e-30));
+    }
+    imageStore(out_irradiance, pixel, vec4(irradiance, receiver.valid ? 1.0 : 0.0));
+}

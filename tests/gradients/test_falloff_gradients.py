@@ -63,7 +63,8 @@ def test_tabulated_gradient_follows_the_full_gather(gl_context):
 
     The table errs by up to 0.1 % in the image.
     """
-    captured = Runtime(colored_room(), context=gl_context).capture(room_view("spot"), WITHOUT_MAPS)
+    config = WITHOUT_MAPS.with_parameters(START)
+    captured = Runtime(colored_room(), context=gl_context).capture(room_view("spot", (32, 24)), config)
     receivers, vpls = gather_inputs(captured)
     table = tabulate_gather(receivers, vpls)
     truth = np.asarray(gather(receivers, vpls, FalloffParameters(*map(jnp.float32, (0.9, 0.4, 0.3)))))

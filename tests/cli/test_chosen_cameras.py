@@ -9,6 +9,7 @@ import pytest
 from quick_fit import QUICK_FIT
 
 from vpltune.cli.program import run
+from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.tuned_config import TunedConfig, write_config
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.export.glb_writer import write_glb
@@ -30,6 +31,7 @@ def room(tmp_path_factory):
     cameras = (replace(first, name="door"), replace(first, to_world=behind, name="near"))
     write_glb(folder / "room.glb", replace(scene, cameras=cameras))
     write_config(folder / "small.json", TunedConfig(QUICK_FIT))
+    write_config(folder / "few.json", TunedConfig(ArtistParameters(vpl_count=32)))
     return folder
 
 
@@ -72,7 +74,8 @@ def test_an_image_is_of_the_named_camera(room, tmp_path):
     images = {}
     for name in ("1", "door", "near"):
         path = tmp_path / f"{name}.png"
-        assert run(["render", scene, "-o", str(path), "--size", "64x48", "--camera", name, "-q"]) == 0
+        more = ["--config", str(room / "few.json"), "--size", "64x48", "--camera", name, "-q"]
+        assert run(["render", scene, "-o", str(path), *more]) == 0
         images[name] = np.asarray(Image.open(path)).astype(int)
     np.testing.assert_array_equal(images["1"], images["door"])
     assert np.abs(images["near"] - images["door"]).mean() > 3.0

@@ -14,6 +14,9 @@ import vpltune.renderer.files.video_file
 import vpltune.renderer.scene.sequence
 from vpltune.cli.options import Motion
 from vpltune.cli.program import run
+from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.quality import Quality
+from vpltune.renderer.config.tuned_config import TunedConfig, write_config
 from vpltune.renderer.frame.runtime import Runtime
 
 # The encoder is started by fork and exec, of which JAX warns once an earlier test has loaded it; the command
@@ -23,8 +26,17 @@ pytestmark = pytest.mark.filterwarnings("ignore:os.fork:RuntimeWarning")
 SCENE = Path(__file__).resolve().parents[2] / "configs" / "scenes" / "cornell-box.glb"
 
 
-def render(output, *more):
-    return run(["render", str(SCENE), "-o", str(output), "--size", "32x24", *more])
+@pytest.fixture
+def render(tmp_path_factory):
+    """The command with the default config, but few VPLs: what is drawn is another test's subject."""
+    config = tmp_path_factory.mktemp("config") / "few.json"
+    write_config(config, TunedConfig(ArtistParameters(vpl_count=32), quality=Quality(rsm_resolution=128)))
+
+    def command(output, *more):
+        common = ["--config", str(config), "--size", "32x24"]
+        return run(["render", str(SCENE), "-o", str(output), *common, *more])
+
+    return command
 
 
 def decoded(path, size) -> np.ndarray:
@@ -38,7 +50,7 @@ def test_motions_of_the_option_are_those_of_the_sequence():
     assert get_args(Motion) == vpltune.renderer.scene.sequence.MOTIONS
 
 
-def test_an_mp4_has_the_frames_asked_for(tmp_path, capfd):
+def test_an_mp4_has_the_frames_asked_for(render, tmp_path, capfd):
     path = tmp_path / "clip.mp4"
     assert render(path, "--frames", "6", "--fps", "3", "--json") == 0
     report = json.loads(capfd.readouterr().out)
@@ -51,7 +63,7 @@ def test_an_mp4_has_the_frames_asked_for(tmp_path, capfd):
     assert [entry.name for entry in tmp_path.iterdir()] == ["clip.mp4"]
 
 
-def test_a_folder_has_numbered_images_of_one_exposure(tmp_path, monkeypatch):
+def test_a_folder_has_numbered_images_of_one_exposure(render, tmp_path, monkeypatch):
     """All frames have the exposure that the first was measured to need: clips must not pump.
 
     That it is the first one's own is `test_the_first_frame_is_the_still_image`.
@@ -74,7 +86,7 @@ def test_a_folder_has_numbered_images_of_one_exposure(tmp_path, monkeypatch):
         assert np.abs(np.asarray(first, int) - np.asarray(third, int)).max() > 2
 
 
-def test_the_first_frame_is_the_still_image(tmp_path):
+def test_the_first_frame_is_the_still_image(render, tmp_path):
     assert render(tmp_path / "frames", "--frames", "1") == 0
     assert render(tmp_path / "still.png") == 0
     with (
@@ -85,12 +97,12 @@ def test_the_first_frame_is_the_still_image(tmp_path):
 
 
 @pytest.mark.parametrize("layer", ["direct", "albedo", "normal", "depth"])
-def test_every_layer_can_be_a_clip(tmp_path, layer):
+def test_every_layer_can_be_a_clip(render, tmp_path, layer):
     assert render(tmp_path / layer, "--frames", "2", "--layer", layer) == 0
     assert len(list((tmp_path / layer).iterdir())) == 2
 
 
-def test_dynamic_lights_fly_in_clips(tmp_path):
+def test_dynamic_lights_fly_in_clips(render, tmp_path):
     assert (
         render(tmp_path / "a", "--frames", "3", "--fps", "2", "--motion", "none", "--dynamic-lights", "40")
         == 0
@@ -102,7 +114,7 @@ def test_dynamic_lights_fly_in_clips(tmp_path):
     assert np.abs(images[0] - images[1]).max() > 5
 
 
-def test_an_interrupt_leaves_no_half_clip(tmp_path, monkeypatch):
+def test_an_interrupt_leaves_no_half_clip(render, tmp_path, monkeypatch):
     drawn = []
     original = Runtime.render
 
@@ -117,7 +129,7 @@ def test_an_interrupt_leaves_no_half_clip(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_frames_in_a_folder_change_together(tmp_path, monkeypatch):
+def test_frames_in_a_folder_change_together(render, tmp_path, monkeypatch):
     """An interrupt leaves the earlier clip; the next one replaces all of it, and nothing else there."""
     folder = tmp_path / "frames"
     folder.mkdir()
@@ -145,7 +157,7 @@ def test_frames_in_a_folder_change_together(tmp_path, monkeypatch):
         assert first.size == (32, 24)
 
 
-def test_a_clip_that_fails_leaves_the_old_one(tmp_path, monkeypatch):
+def test_a_clip_that_fails_leaves_the_old_one(render, tmp_path, monkeypatch):
     path = tmp_path / "clip.mp4"
     path.write_bytes(b"old")
     monkeypatch.setattr(Runtime, "render", lambda *arguments, **more: 1 / 0)
@@ -166,7 +178,7 @@ def test_a_clip_that_fails_leaves_the_old_one(tmp_path, monkeypatch):
         ("clip.mp4", ["--motion", "up"], "--motion"),
     ],
 )
-def test_what_cannot_be_a_clip_is_refused_first(tmp_path, capfd, output, more, message):
+def test_what_cannot_be_a_clip_is_refused_first(render, tmp_path, capfd, output, more, message):
     (tmp_path / "file").write_text("")
     assert render(tmp_path / output, "--frames", "2", *more) == 2
     assert message in capfd.readouterr().err

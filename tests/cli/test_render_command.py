@@ -17,6 +17,7 @@ from vpltune.cli.options import (
     RsmResolutionOption,
 )
 from vpltune.cli.program import run
+from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import (
     INTERLEAVES,
     LARGEST_MAP,
@@ -24,8 +25,9 @@ from vpltune.renderer.config.quality import (
     MAP_REFINEMENTS,
     SMALLEST_MAP,
     SMALLEST_RSM,
+    Quality,
 )
-from vpltune.renderer.config.tuned_config import TunedConfig
+from vpltune.renderer.config.tuned_config import TunedConfig, write_config
 from vpltune.renderer.errors import MachineError
 from vpltune.renderer.files.image_file import read_exr
 from vpltune.renderer.frame.runtime import Runtime
@@ -35,6 +37,7 @@ from vpltune.renderer.scene.views import View, write_views
 SCENE = Path(__file__).resolve().parents[2] / "configs" / "scenes" / "cornell-box.glb"
 LAYERS = get_args(Layer)
 SIZE = (32, 24)
+FEW = TunedConfig(ArtistParameters(vpl_count=64), quality=Quality(rsm_resolution=128))
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +46,7 @@ def views_path(tmp_path_factory) -> Path:
     scene = read_scene(SCENE)
     (camera,), lights = scene.cameras, scene.lights
     path = tmp_path_factory.mktemp("views") / "views.json"
+    write_config(path.with_name("few.json"), FEW)
     write_views(
         path,
         str(SCENE),
@@ -52,9 +56,10 @@ def views_path(tmp_path_factory) -> Path:
 
 
 def render(views_path, output, *more):
-    return run(
-        ["render", str(SCENE), "-o", str(output), "--views", str(views_path), "--view", "front", *more]
-    )
+    """The command with few VPLs, where `more` gives no other config: what they light is not the subject."""
+    config = () if "--config" in more else ("--config", str(views_path.with_name("few.json")))
+    views = ("--views", str(views_path), "--view", "front")
+    return run(["render", str(SCENE), "-o", str(output), *config, *views, *more])
 
 
 @pytest.mark.parametrize("layer", LAYERS)
@@ -76,7 +81,9 @@ def test_a_config_that_says_nothing_of_quality_is_drawn_with_the_defaults(views_
     drawn = {}
     for refinement in (None, 1):
         more = () if refinement is None else (f"--map-refinement={refinement}",)
-        assert render(views_path, tmp_path / "a.exr", "--layer", "irradiance", *more) == 0
+        assert (
+            render(views_path, tmp_path / "a.exr", "--layer", "irradiance", "--config", "default", *more) == 0
+        )
         drawn[refinement] = read_exr(tmp_path / "a.exr")
     scene = read_scene(SCENE)
     (camera,) = scene.cameras

@@ -19,11 +19,11 @@ from tests.fuzzing.run import kept_cases
 from tests.fuzzing.tree_text import json_text, toml_text
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-# A choice: 150 for each reader.
-QUICK_CASES = 1200
-# They took 7 s on two cores alone, and 18 s where eight other processes shared them; twice the latter, for a
-# machine half as fast.
-MOST_CPU_S = 36.0
+# A choice: 75 for each reader. `make fuzz` takes tens of thousands.
+QUICK_CASES = 600
+# Twice as many took 7 s on two cores alone, and 18 s where eight other processes shared them. These may take
+# the latter, for a machine half as fast.
+MOST_CPU_S = 18.0
 
 
 def fuzzed(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -13,6 +13,7 @@ from scene_paths import OUTSIDE_SCENES, OWN_SCENES, outside_scene
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.light_settings import ONE_BOUNCE
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.files import read_scene
@@ -31,13 +32,13 @@ from vpltune.tuner.surrogate.vpl_gather import (
 )
 
 POINTS = (
-    point_vpls(),
-    point_vpls(intensity=0.7, falloff_footprint=2.0, extinction_coefficient=0.8),
-    point_vpls(intensity=3.0, falloff_footprint=0.1, extinction_coefficient=0.0),
+    point_vpls(vpl_count=256),
+    point_vpls(vpl_count=256, intensity=0.7, falloff_footprint=2.0, extinction_coefficient=0.8),
+    point_vpls(vpl_count=256, intensity=3.0, falloff_footprint=0.1, extinction_coefficient=0.0),
 )
 
 # Visibility maps have their own twins in test_visibility_twins.py.
-WITHOUT_MAPS = TunedConfig(point_vpls(), visibility="transmittance")
+WITHOUT_MAPS = TunedConfig(POINTS[0], visibility="transmittance", quality=Quality(rsm_resolution=256))
 
 
 def relative_rms(value: np.ndarray, expected: np.ndarray) -> float:
@@ -46,7 +47,7 @@ def relative_rms(value: np.ndarray, expected: np.ndarray) -> float:
 
 
 DISCS = (
-    ArtistParameters(),
+    ArtistParameters(vpl_count=256),
     ArtistParameters(vpl_count=32, lloyd_iterations=4, falloff_footprint=1.0),
     ArtistParameters(
         vpl_count=200,
@@ -81,7 +82,7 @@ def test_twins_agree_in_the_room(gl_context, light, parameters):
 def scene_twin_error(path, gl_context) -> float:
     scene = read_scene(path)
     camera, lights, _ = resolve_camera_and_lights(scene, path, None, None)
-    view = View(path.stem, "fitted", (96, 72), camera, lights)
+    view = View(path.stem, "fitted", (48, 36), camera, lights)
     runtime = Runtime(scene, context=gl_context)
     return max(twin_error(runtime, view, parameters) for parameters in (*POINTS[1:], *DISCS[:2]))
 
@@ -113,7 +114,8 @@ def test_factored_gather_equals_its_definition(gl_context, light, config):
 @pytest.mark.parametrize("light", ["spot", "directional"])
 def test_tabulated_gather_is_close(gl_context, light):
     """In the range where fits end, interpolation between nodes errs by less than 0.2 % relative RMSE."""
-    captured = Runtime(colored_room(), context=gl_context).capture(room_view(light), WITHOUT_MAPS)
+    config = WITHOUT_MAPS.with_parameters(point_vpls(vpl_count=1024))
+    captured = Runtime(colored_room(), context=gl_context).capture(room_view(light, (32, 24)), config)
     receivers, vpls = gather_inputs(captured)
     table = tabulate_gather(receivers, vpls)
     for alpha in (0.05, 0.5, 1.0, 3.0):
@@ -127,7 +129,7 @@ def test_tabulated_gather_is_close(gl_context, light):
 def test_tabulated_gather_of_discs_is_close(gl_context, light):
     """The error is below 4 % for 32 discs, whose edges cross receivers between nodes of α; 0.3 % at α = 1."""
     config = replace(WITHOUT_MAPS.with_parameters(DISCS[1]), light=ONE_BOUNCE)
-    captured = Runtime(colored_room(), context=gl_context).capture(room_view(light), config)
+    captured = Runtime(colored_room(), context=gl_context).capture(room_view(light, (32, 24)), config)
     receivers, vpls = gather_inputs(captured)
     assert vpls.cells
     table = tabulate_gather(receivers, vpls)
@@ -160,7 +162,7 @@ def test_nothing_lit_is_finite():
     camera = Camera(look_at(np.array([0.0, 0.0, 3.6]), np.zeros(3)), 0.7)
     away = Light("spot", np.ones(3), np.array([0.0, 0.0, 3.0]), np.array([0.0, 0.0, 1.0]), 0.1, 0.3)
     view = View("dark", "fitted", (16, 12), camera, (away,))
-    captured = Runtime(floor).capture(view, TunedConfig())
+    captured = Runtime(floor).capture(view, TunedConfig(ArtistParameters(vpl_count=64)))
     receivers, vpls = gather_inputs(captured)
     assert not np.asarray(gather(receivers, vpls, FalloffParameters.of(ArtistParameters()))).any()
     assert not np.asarray(

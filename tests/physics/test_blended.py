@@ -64,7 +64,7 @@ def test_the_reflected_flux_is_shared_out(gl_context, opacity):
     assert flux == pytest.approx(expected, rel=3e-3)
 
 
-@pytest.mark.parametrize(("opacity", "cards"), [(0.3, 1), (0.3, 2)])
+@pytest.mark.parametrize(("opacity", "cards"), [pytest.param(0.3, 1, marks=pytest.mark.slow), (0.3, 2)])
 def test_light_of_a_lit_floor_passes_by_its_share(gl_context, opacity, cards):
     """The ceiling sees the lamp's light on the floor through the cards alone.
 

@@ -40,7 +40,8 @@ UNLIT = {"bevy-irradiancevolumeexample"}
 
 def captured(gl_context, scene, view, interleave, **parameters) -> CapturedFrame:
     """What the runtime draws, by default with points."""
-    config = TunedConfig(point_vpls(**parameters), quality=Quality(interleave=interleave), light=ONE_BOUNCE)
+    quality = Quality(interleave=interleave, map_size=16, map_refinement=2, rsm_resolution=256)
+    config = TunedConfig(point_vpls(**parameters), quality=quality, light=ONE_BOUNCE)
     return Runtime(scene, context=gl_context).capture(view, config)
 
 
@@ -392,7 +393,8 @@ def test_scenes_of_others_differ_little_from_the_full_gather(gl_context, scenes_
 
 def test_frames_repeat_bitwise(gl_context):
     """The list of pixels fills in any order; the image does not show it."""
-    view, config = room_view("spot", (96, 72)), TunedConfig(quality=Quality(interleave=4), light=ONE_BOUNCE)
+    view = room_view("spot", (96, 72))
+    config = TunedConfig(ArtistParameters(vpl_count=128), quality=Quality(4), light=ONE_BOUNCE)
     runtime = Runtime(colored_room(), context=gl_context)
     first = runtime.capture(view, config).vpl_irradiance
     runtime.capture(room_view("point", (96, 72)), config)

@@ -33,9 +33,9 @@ def means(runtime, kind, count):
     """Mean direct and indirect irradiance under `count` lights in one place, each with its share."""
     light = replace(ROOM_LIGHTS[kind], intensity=ROOM_LIGHTS[kind].intensity / count)
     camera = Camera(look_at(np.array([0.0, 0.0, 2.5]), np.zeros(3)), 0.8)
-    drawn = runtime.capture(
-        View(kind, "fitted", (64, 48), camera, (light,) * count), TunedConfig(light=ONE_BOUNCE)
-    )
+    # Without visibility maps: they know nothing of lights.
+    config = TunedConfig(visibility="transmittance", light=ONE_BOUNCE)
+    drawn = runtime.capture(View(kind, "fitted", (64, 48), camera, (light,) * count), config)
     return np.array([drawn.direct_irradiance[drawn.valid].mean(), drawn.vpl_irradiance[drawn.valid].mean()])
 
 

@@ -45,7 +45,7 @@ def lit_by(
 @KINDS
 @pytest.mark.parametrize(
     "thickness",
-    [pytest.param(0.30, marks=pytest.mark.slow), 0.10, pytest.param(0.05, marks=pytest.mark.slow), 0.02],
+    [*(pytest.param(each, marks=pytest.mark.slow) for each in (0.30, 0.10, 0.05)), 0.02],
 )
 def test_nothing_shows_behind_a_partition(gl_context, thickness, parameters):
     """What the far lamp leaks is at most 1 % of the own lamp's mean, anywhere.

@@ -22,7 +22,11 @@ def runtime_with(scene, gl_context, filtering) -> Runtime:
 
 
 def config_with(**parameters) -> TunedConfig:
-    return TunedConfig(point_vpls(**parameters), quality=Quality(rsm_resolution=256), light=ONE_BOUNCE)
+    """Without visibility maps: VPLs are looked at, and light that nothing stands in the way of."""
+    quality = Quality(rsm_resolution=256)
+    return TunedConfig(
+        point_vpls(**parameters), visibility="transmittance", quality=quality, light=ONE_BOUNCE
+    )
 
 
 @pytest.mark.parametrize("light", ROOM_LIGHTS)

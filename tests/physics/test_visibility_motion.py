@@ -13,7 +13,7 @@ from vpltune.renderer.frame.runtime import Runtime
 FRAMES = 16
 STEP = 0.03
 """In a room that is 2 wide: as fast as a hand carries a thing at 60 frames a second."""
-PARAMETERS = ArtistParameters(vpl_count=256)
+PARAMETERS = ArtistParameters(vpl_count=64)
 
 
 def poses() -> list[np.ndarray]:

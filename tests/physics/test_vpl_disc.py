@@ -155,12 +155,13 @@ def test_gradients_are_finite_at_the_hard_points():
     """In the plane, in the middle, on the rim, parallel, upside down, and a disc without a size."""
     places = [(0, 0, 0), (0, 0, 1e-9), (1, 0, 0), (1, 0, 1e-9), (0, 0, 1), (0, 0, -1), (5, 0, 0)]
     normals = [(0, 0, 1), (0, 0, -1), (1, 0, 0), (-1, 0, 0), (0, 1, 0)]
+    value_and_gradient = jax.jit(jax.value_and_grad(disc_form, argnums=(0, 1, 2, 3, 4)))
     for place in np.array(places, float):
         for normal in np.array(normals, float):
             for radius in (LEAST_RADIUS, 1.0, 20.0):
                 values = (place @ place, -place @ normal, place[2], normal[2], radius)
                 arguments = tuple(jnp.float32(max(values[0], 1e-18)) if i == 0 else jnp.float32(v)
                                   for i, v in enumerate(values))  # fmt: skip
-                value, gradient = jax.value_and_grad(disc_form, argnums=(0, 1, 2, 3, 4))(*arguments)
+                value, gradient = value_and_gradient(*arguments)
                 assert np.isfinite(value) and value >= 0.0
                 assert np.isfinite(gradient).all(), (place, normal, radius)

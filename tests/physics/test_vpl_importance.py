@@ -16,7 +16,9 @@ from vpltune.renderer.scene.views import View, scaled_view
 
 
 def config_with(**parameters) -> TunedConfig:
-    return TunedConfig(point_vpls(**parameters), quality=Quality(rsm_resolution=256), light=ONE_BOUNCE)
+    """With small visibility maps: images are compared with one another, all of which have them."""
+    quality = Quality(rsm_resolution=256, map_size=8, map_refinement=1)
+    return TunedConfig(point_vpls(**parameters), quality=quality, light=ONE_BOUNCE)
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,7 @@ from own_reference import own_reference
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.light_settings import ONE_BOUNCE
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.tuner.fitting.fit_placement import fit_placement
@@ -33,8 +34,8 @@ PLANTED = ArtistParameters(
 
 def drawn_by_the_runtime(gl_context, light: str, parameters: ArtistParameters) -> CapturedView:
     """A view whose reference is the runtime's own image with known parameters."""
-    view = room_view(light)
-    config = TunedConfig(parameters, visibility="maps", light=ONE_BOUNCE)
+    view = room_view(light, (32, 24))
+    config = TunedConfig(parameters, visibility="maps", quality=Quality(rsm_resolution=256), light=ONE_BOUNCE)
     captured = Runtime(colored_room(), context=gl_context).capture(view, config)
     return CapturedView(view, own_reference(captured), captured)
 

@@ -37,8 +37,7 @@ PASSES = [
 ]
 """In the order in which a frame runs them."""
 
-CONFIG = TunedConfig(quality=Quality(interleave=4, rsm_resolution=128))
-SMALL = replace(CONFIG, parameters=ArtistParameters(vpl_count=64))
+CONFIG = TunedConfig(ArtistParameters(vpl_count=64), quality=Quality(interleave=4, rsm_resolution=128))
 
 
 @pytest.fixture
@@ -67,22 +66,22 @@ def with_before(name: str, *added: str) -> list[str]:
 
 
 def changed(**parameters) -> TunedConfig:
-    return replace(SMALL, parameters=replace(SMALL.parameters, **parameters))
+    return replace(CONFIG, parameters=replace(CONFIG.parameters, **parameters))
 
 
 CASES = {
-    "default": (SMALL, without("light_pre_pass")),
+    "default": (CONFIG, without("light_pre_pass")),
     "no visibility maps": (
-        SMALL.seen_by("transmittance"),
+        CONFIG.seen_by("transmittance"),
         without("light_pre_pass", "receiver_bounds", "vpl_visibility_maps"),
     ),
-    "full gather": (SMALL.with_full_gather(), without("light_pre_pass", "interleaved_filter")),
+    "full gather": (CONFIG.with_full_gather(), without("light_pre_pass", "interleaved_filter")),
     "one VPL is not interleaved": (
-        replace(SMALL, parameters=ArtistParameters(vpl_count=1)),
+        replace(CONFIG, parameters=ArtistParameters(vpl_count=1)),
         without("light_pre_pass", "interleaved_filter"),
     ),
     "points, and discs of later light": (changed(lloyd_iterations=0), without("light_pre_pass")),
-    "one bounce": (replace(SMALL, light=ONE_BOUNCE), without("light_pre_pass", "light_walks")),
+    "one bounce": (replace(CONFIG, light=ONE_BOUNCE), without("light_pre_pass", "light_walks")),
     "one bounce of points": (
         replace(changed(lloyd_iterations=0), light=ONE_BOUNCE),
         without("light_pre_pass", "light_walks", "clustered_discs"),
@@ -94,7 +93,7 @@ CASES = {
     ),
     "no near field of discs": (changed(screen_space_strength=1.0), without("light_pre_pass")),
     "prior": (
-        replace(SMALL, auto=made_prior()),
+        replace(CONFIG, auto=made_prior()),
         with_before("vpl_gather", "scene_statistics", "auto_parameters"),
     ),
 }

@@ -74,11 +74,16 @@ def everything_view(size=(48, 32)) -> View:
     return View("all", view.split, size, view.camera, tuple(ROOM_LIGHTS.values()))
 
 
+def few_vpls(**quality) -> TunedConfig:
+    """The default frame, of which nothing that is counted here depends on how many VPLs there are."""
+    return TunedConfig(ArtistParameters(vpl_count=64), quality=Quality(rsm_resolution=64, **quality))
+
+
 @pytest.mark.parametrize(("light_path", "interleave"), [("auto", 4), ("volumes", 1), ("tiles", 1)])
 def test_a_frame_reads_nothing_back(gl_context, calls, light_path, interleave):
     """Ten frames with all kinds of lights, after the first: no read, no wait and no allocation at all."""
     runtime = Runtime(colored_room(), RuntimeOptions(light_path=light_path), context=gl_context)
-    config = TunedConfig(quality=Quality(interleave=interleave, rsm_resolution=64))
+    config = few_vpls(interleave=interleave)
     view = everything_view()
     runtime.draw(view, config, lights=moving_lights(0))
     calls.clear()
@@ -146,7 +151,7 @@ def test_two_configs_in_turn_read_and_allocate_nothing(gl_context, calls):
 def test_the_first_frame_reads_nothing_either(gl_context, calls):
     """Only the choice of a light path waits for the GPU, to time it; no data comes back."""
     runtime = Runtime(colored_room(), context=gl_context)
-    config = TunedConfig(quality=Quality(rsm_resolution=64))
+    config = few_vpls()
     calls.clear()
     runtime.draw(everything_view(), config, lights=moving_lights(0))
     assert {name for name in calls if name.split(".")[1] not in ALLOCATIONS} == {"Context.finish"}
@@ -155,7 +160,7 @@ def test_the_first_frame_reads_nothing_either(gl_context, calls):
 def test_reads_are_seen(gl_context, calls):
     """The count is not blind: an image asked for is one read, buffers captured are more."""
     runtime = Runtime(colored_room(), context=gl_context)
-    config = TunedConfig(quality=Quality(rsm_resolution=64))
+    config = few_vpls()
     view = everything_view()
     runtime.render(view, config)
     assert calls["Texture.read"] == 1

@@ -18,7 +18,7 @@ from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View
 
 # Visibility maps see a skin as rigid pieces, see renderer/gpu/ray_hierarchy.py.
-WITHOUT_MAPS = TunedConfig(point_vpls(), visibility="transmittance", light=ONE_BOUNCE)
+WITHOUT_MAPS = TunedConfig(point_vpls(vpl_count=256), visibility="transmittance", light=ONE_BOUNCE)
 # As points: which disc a sample goes to may hang on its last digit.
 MAPS = WITHOUT_MAPS.seen_by("maps")
 BUFFERS = ("position_world", "normal_world", "direct_irradiance", "indirect_irradiance")

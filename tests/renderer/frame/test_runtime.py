@@ -7,12 +7,14 @@ import pytest
 from built_scenes import colored_room, room_view
 from made_priors import made_prior
 
+from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.clip_state import ClipState
 from vpltune.renderer.frame.runtime import LAYERS, Runtime
 
-CONFIG = TunedConfig()
+CONFIG = TunedConfig(ArtistParameters(vpl_count=64), quality=Quality(rsm_resolution=128))
+"""The default frame with few VPLs: every pass of it runs."""
 
 
 def test_runtimes_do_not_disturb_each_other():

@@ -35,7 +35,7 @@ from vpltune.renderer.scene.views import View, scaled_view
 from vpltune.renderer.techniques.light_per_draw import LightPerDrawPass
 
 WAYS = (LightPerDrawPass, LightVolumesPass, TiledLightsPass)
-CONFIG = TunedConfig(light=ONE_BOUNCE)
+CONFIG = TunedConfig(ArtistParameters(vpl_count=16), quality=Quality(rsm_resolution=128), light=ONE_BOUNCE)
 SIZE = (136, 72)
 """Not a whole number of tiles, and more than one cell."""
 

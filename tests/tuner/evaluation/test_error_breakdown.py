@@ -22,7 +22,7 @@ def budgets(tmp_path_factory):
     found = {}
     for visibility in ("transmittance", "maps"):
         tuned = TunedConfig(ArtistParameters(vpl_count=64), light=ONE_BOUNCE).seen_by(visibility)
-        options = EvaluateOptions(views=1, size=(48, 36), tuned=tuned, split_error=True)
+        options = EvaluateOptions(views=1, size=(32, 24), tuned=tuned, split_error=True)
         found[visibility] = evaluate_scene(CORNELL, options, lambda stage, share: None).document
     return found
 

@@ -21,7 +21,12 @@ from vpltune.tuner.fitting.fit_density import (
 from vpltune.tuner.fitting.fit_status import FitStatus
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
-FEW = TunedConfig(point_vpls(vpl_count=24), quality=Quality(rsm_resolution=128), light=ONE_BOUNCE)
+FEW = TunedConfig(
+    point_vpls(vpl_count=24),
+    quality=Quality(map_size=8, map_refinement=1, rsm_resolution=128),
+    light=ONE_BOUNCE,
+)
+"""With small visibility maps: the reference is an image of the runtime's own, which has them too."""
 
 
 @pytest.fixture(scope="module")

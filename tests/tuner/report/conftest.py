@@ -7,6 +7,8 @@ import pytest
 from headless_chromium import headless_chromium
 from quick_fit import QUICK_FIT
 
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
+from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 
 SCENE = Path(__file__).resolve().parents[3] / "configs" / "scenes" / "cornell-box.glb"
@@ -14,12 +16,12 @@ SCENE = Path(__file__).resolve().parents[3] / "configs" / "scenes" / "cornell-bo
 
 @pytest.fixture(scope="session")
 def fitted_folder(tmp_path_factory) -> Path:
-    """The output of `vpltune fit` for the shipped Cornell box, with few VPLs and pixels."""
+    """The output of `vpltune fit` for the shipped Cornell box, with few VPLs and pixels and one bounce."""
     from vpltune.tuner.scene_fit.fit_scene import FitOptions, fit_scene
 
     folder = tmp_path_factory.mktemp("report") / "fit"
-    start = TunedConfig(QUICK_FIT)
-    options = FitOptions(start=start, views=1, size=(64, 48), command="vpltune fit box.glb -o 'my out'")
+    start = TunedConfig(QUICK_FIT, quality=Quality(map_size=8, rsm_resolution=256), light=ONE_BOUNCE)
+    options = FitOptions(start=start, views=1, size=(32, 24), command="vpltune fit box.glb -o 'my out'")
     fit_scene(SCENE, folder, options, lambda stage, share: None)
     return folder
 

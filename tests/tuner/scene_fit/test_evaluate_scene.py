@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
+from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import InputError
@@ -17,8 +18,8 @@ from vpltune.tuner.scene_fit.evaluate_scene import EvaluateOptions, SceneEvaluat
 from vpltune.tuner.scene_fit.fit_scene import default_like
 
 SCENE = Path(__file__).resolve().parents[3] / "configs" / "scenes" / "cornell-box.glb"
-FINE = TunedConfig(ArtistParameters(intensity=1.2, vpl_count=64))
-COARSE = TunedConfig(FINE.parameters, quality=Quality(4, 8, 2, 256))
+FINE = TunedConfig(ArtistParameters(intensity=1.2, vpl_count=64), light=ONE_BOUNCE)
+COARSE = replace(FINE, quality=Quality(4, 8, 2, 256))
 
 
 @pytest.fixture(scope="module")

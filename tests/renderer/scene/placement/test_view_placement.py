@@ -128,7 +128,13 @@ def test_lit_points_are_those_in_sight_of_the_light(kind):
 
 
 @pytest.mark.parametrize(
-    ("name", "factor"), [("cornell-box", 100.0), ("gallery", 0.01), ("gallery", 7.3), ("courtyard", 0.1)]
+    ("name", "factor"),
+    [
+        ("cornell-box", 100.0),
+        ("gallery", 0.01),
+        pytest.param("gallery", 7.3, marks=pytest.mark.slow),
+        ("courtyard", 0.1),
+    ],
 )
 def test_choices_do_not_depend_on_scale(name, factor):
     """A scaled scene gets the scaled camera and light, up to the rounding of 10⁻⁵ voxels in placement."""

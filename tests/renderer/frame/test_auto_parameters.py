@@ -21,7 +21,7 @@ from vpltune.renderer.scene.views import scaled_view
 BASE = ArtistParameters(vpl_count=64, screen_space_radius=5.0)
 POINTS = dataclasses.replace(BASE, lloyd_iterations=0)
 """Clusters go on from frame to frame in a clip; points do not."""
-QUALITY = Quality(rsm_resolution=128, adaptation_frames=2.0)
+QUALITY = Quality(map_size=8, rsm_resolution=128, adaptation_frames=2.0)
 CONFIG = TunedConfig(BASE, visibility="maps", auto=made_prior(), quality=QUALITY, light=ONE_BOUNCE)
 GENTLE = dataclasses.replace(CONFIG, auto=made_prior(strength=0.2))
 

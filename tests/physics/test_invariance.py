@@ -21,8 +21,9 @@ from vpltune.renderer.scene.views import View, scaled_view
 
 ROTATIONS = ((0.0, 0.0), (0.3, 0.7), (0.6, 0.1), (0.15, 0.45))
 PARAMETERS = ArtistParameters(intensity=1.3, falloff_footprint=0.8, extinction_coefficient=0.3, vpl_count=64)
-CONFIG = TunedConfig(PARAMETERS, quality=Quality(rsm_resolution=128), light=ONE_BOUNCE)
-"""Few discs and a small RSM: none of what these tests compare depends on how many there are."""
+CONFIG = TunedConfig(PARAMETERS, quality=Quality(rsm_resolution=256), light=ONE_BOUNCE)
+"""Few discs and a small RSM, which take a sixth of the time. The largest error of an image was 4e-4; with 512
+discs it is 1.1e-3."""
 
 
 def mean_irradiance(gl_context, view: View, vpl_count=1024, rsm_resolution=512) -> float:

@@ -42,7 +42,7 @@ FRAMES = 48
 REFERENCE_VPLS = 2048
 """Discs of the reference. A choice: four times the default."""
 RADIANCE = 40.0
-"""Of the panel, W/(m² sr). A choice: flicker and delay are ratios."""
+"""Radiance of the panel, W/(m² sr). A choice: flicker and delay are ratios."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -240,9 +240,8 @@ def test_neighbours_count_as_if_they_had_the_normal(gl_context):
     depth, _ = flat_wall(shape)
     normal = FACING + random.uniform(-0.15, 0.15, (*shape, 2))
     light = np.tile(FACING + 0.1, (*shape, 1))
-    cosine = (octahedral_decode(normal.astype(np.float32)) * octahedral_decode(light.astype(np.float32))).sum(
-        -1
-    )
+    normals, lights = (octahedral_decode(encoded.astype(np.float32)) for encoded in (normal, light))
+    cosine = (normals * lights).sum(axis=-1)
     image = np.ones((*shape, 4))
     image[..., :3] = cosine[..., None] * np.array([3.0, 2.0, 1.0])
     out, _ = filtered(gl_context, 4, image, (depth, normal), light=light)

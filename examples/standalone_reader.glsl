@@ -7,6 +7,7 @@ struct Light {
     vec4 position_kind;        // world position; 0 spot, 1 point, 2 directional
     vec4 direction_scale;      // unit direction of travel; 1 / (cos inner - cos outer)
     vec4 intensity_cos_outer;  // W/sr (directional: W/m²); cosine of the outer half angle
+    vec4 inverse_range;        // 1 / range, 0 where the light does not end; 0, 0, 0
 };
 layout(std430, binding = 0) readonly buffer Lights { Light lights[]; };
 
@@ -18,7 +19,10 @@ vec3 arriving(Light light, vec3 position, out vec3 towards) {
     towards = normalize(offset);
     float cosine = dot(-towards, light.direction_scale.xyz);
     float cone = clamp((cosine - light.intensity_cos_outer.w) * light.direction_scale.w, 0.0, 1.0);
-    return light.intensity_cos_outer.rgb / dot(offset, offset) * (light.position_kind.w == 0.0 ? cone * cone : 1.0);
+    float ratio = dot(offset, offset) * light.inverse_range.x * light.inverse_range.x;
+    float left = max(1.0 - ratio * ratio, 0.0);
+    left *= light.position_kind.w == 0.0 ? cone * cone : 1.0;
+    return light.intensity_cos_outer.rgb * left / dot(offset, offset);
 }
 
 #ifdef VERTEX

@@ -49,6 +49,7 @@ SPOT = {
 }
 WIDE_SPOT = {**SPOT, "inner_cone": 0.2, "outer_cone": 1.3}
 POINT = {"type": "point", "position": [0.4, 1.7, 0.2], "intensity": [3.0, 4.0, 5.0]}
+POINT_WITH_RANGE = {**POINT, "range": 2.2}
 SUN = {
     "type": "directional",
     "direction": unit(np.array([0.48, -0.6, -0.64])).tolist(),
@@ -93,7 +94,7 @@ def test_vectors() -> dict[str, Any]:
         "version": 1,
         "boxes": BOXES,
         "point_table": _point_table(),
-        "lights": [_light(light) for light in (SPOT, POINT, SUN)],
+        "lights": [_light(light) for light in (SPOT, POINT, POINT_WITH_RANGE, SUN)],
         "faces": [_faces(light) for light in (SPOT, WIDE_SPOT, POINT, SUN)],
         "rsm": _rsm(face, rsm, texels),
         "placement": [_placement(face, texels, *case) for case in PLACEMENTS],

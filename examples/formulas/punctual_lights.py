@@ -2,7 +2,7 @@
 
 docs/runtime_formulas.md, "Lights" and "RSM faces". A light is a dict as in views.json: `type`, `position`,
 `direction` (the way light travels, unit), `intensity` (W/sr, or W/m² for a directional light), `inner_cone`,
-`outer_cone` (half angles in radians).
+`outer_cone` (half angles in radians), and `range` (world units) where its light ends.
 """
 
 import math
@@ -38,6 +38,11 @@ def cone_falloff(light: dict, from_light: np.ndarray) -> np.ndarray:
     return np.clip((cosine - cos_outer) / max(cos_inner - cos_outer, 1e-6), 0.0, 1.0) ** 2
 
 
+def range_falloff(light: dict, distance: np.ndarray) -> np.ndarray:
+    """Share of the light that is left at a distance (KHR_lights_punctual)."""
+    return np.maximum(1.0 - (distance / light.get("range", math.inf)) ** 4, 0.0)
+
+
 def towards_light(light: dict, position: np.ndarray) -> np.ndarray:
     """Unit vectors from points to the light."""
     if light["type"] == "directional":
@@ -51,8 +56,8 @@ def facing_irradiance(light: dict, position: np.ndarray) -> np.ndarray:
     if light["type"] == "directional":
         return np.broadcast_to(intensity, position.shape)
     from_light = position - np.asarray(light["position"])
-    cone = cone_falloff(light, unit(from_light))
-    return intensity * (cone / dot(from_light, from_light))[..., None]
+    left = cone_falloff(light, unit(from_light)) * range_falloff(light, length(from_light))
+    return intensity * (left / dot(from_light, from_light))[..., None]
 
 
 def rotation_along(direction: np.ndarray) -> np.ndarray:

@@ -61,7 +61,7 @@ def rsm_texels(
     """Texels from what the RSM pass stores.
 
     Args:
-        light: its intensity is used; the cone is part of the reflectance.
+        light: its intensity is used; cone and range are part of the reflectance.
         face: as `punctual_lights.light_faces` gives it, with its `resolution`.
         depth: [row, column] as `stored_depth`; 0 where nothing is hit.
         normal: [row, column, 3] of the true plane, on the lit side.

@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 import struct
 from pathlib import Path
 from typing import Any
@@ -199,6 +200,8 @@ class _GlbDocument:
             }
             if light.kind == "spot":
                 entry["spot"] = {"innerConeAngle": light.inner_cone, "outerConeAngle": light.outer_cone}
+            if light.kind != "directional" and light.range < math.inf:
+                entry["range"] = light.range
             entries["KHR_lights_punctual"]["lights"].append(entry)
             reference = {"light": len(entries["KHR_lights_punctual"]["lights"]) - 1}
             self._add_node(

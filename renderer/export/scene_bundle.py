@@ -36,7 +36,7 @@ from vpltune.renderer.scene.views import View, light_to_json
 FORMAT = "vpltune-bundle"
 VERSION = 3
 """Version of the bundle that is written. Since 2 its `config` is of version 2; since 3 a sun may have several
-faces, each within the one before, and importance mixes."""
+faces, each within the one before, importance mixes, and a light may have a range."""
 # What triangles without a texture look up.
 WHITE = Texture("white", np.full((1, 1, 3), 255, np.uint8))
 # A choice: materials that a sentence of `left_out` names.
@@ -256,14 +256,14 @@ def _add_light_records(view: View, records: LightRecords, resolution: int, binar
     """Lights and faces once more, as rows that a shader storage buffer takes as they are.
 
     A light: position, kind (0 spot, 1 point, 2 directional); direction, 1/(cos inner − cos outer); intensity,
-    cos outer. A face: world to face, column by column; extent, number of its light, 1 where orthographic;
-    column and row of its tile in the atlas, near plane or range, 0.
+    cos outer; 1/range, 0, 0, 0. A face: world to face, column by column; extent, number of its light, 1 where
+    orthographic; column and row of its tile in the atlas, near plane or range, 0.
     """
-    lights = np.concatenate(
-        [records.lights[name] for name in ("position_kind", "direction_cone_scale", "intensity_cos_outer")],
-        axis=1,
-    )
-    binary.add_array("lights", lights.reshape(len(view.lights), 3, 4))
+    lights = np.zeros((len(view.lights), 4, 4), np.float32)
+    for row, name in enumerate(("position_kind", "direction_cone_scale", "intensity_cos_outer")):
+        lights[:, row] = records.lights[name]
+    lights[:, 3, 0] = records.lights["inverse_range"]
+    binary.add_array("lights", lights)
     faces = np.zeros((len(records.faces), 6, 4), np.float32)
     for row, face, place in zip(faces, records.faces, _faces(records, resolution), strict=True):
         # Transposed twice: the record has the matrix column by column, and its inverse must be so too.

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float64
 
+from vpltune.renderer.scene.light_range import inverse_range
 from vpltune.renderer.scene.scene import Light
 from vpltune.renderer.scene.spot_cone import cone_scale
 from vpltune.renderer.scene.sun_faces import SunGrid, sun_faces
@@ -18,7 +19,9 @@ LIGHT_DTYPE = np.dtype(
         ("position_kind", "f4", 4),
         ("direction_cone_scale", "f4", 4),
         ("intensity_cos_outer", "f4", 4),
-        ("faces", "i4", 4),
+        ("faces", "i4", 2),
+        ("inverse_range", "f4"),
+        ("padding", "f4"),
     ]
 )
 """A light in shaders/common/lights.glsl (std430). `faces` holds the first face and the number of faces."""
@@ -108,7 +111,9 @@ def light_records(
             (*light.position_world, KIND_CODES[light.kind]),
             (*light.direction_world, cone_scale(light.inner_cone, light.outer_cone)),
             (*light.intensity, math.cos(light.outer_cone)),
-            (len(faces), len(own), 0, 0),
+            (len(faces), len(own)),
+            inverse_range(light),
+            0.0,
         )
         faces += own
     all_faces = np.array(faces, FACE_DTYPE) if faces else np.zeros(0, FACE_DTYPE)

@@ -6,6 +6,7 @@ some have holes, or let a share of the light pass. Lengths are in world units.
 Colours are linear, in the Rec. 709 primaries, unless a name says sRGB.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -158,7 +159,8 @@ class Light:
 
     A spot's intensity falls off between `inner_cone` and `outer_cone` (half angles in radians,
     0 ≤ inner < outer ≤ π/2) by the factor clamp((cos θ − cos outer)/(cos inner − cos outer), 0, 1)², as
-    KHR_lights_punctual specifies.
+    KHR_lights_punctual specifies. A spot or point light with a `range` gives max(1 − (d/range)⁴, 0) of the
+    irradiance that it would give without one at the distance d, as that extension recommends.
 
     Vectors may be given as any three numbers, and an intensity as one number for a white light.
 
@@ -166,7 +168,8 @@ class Light:
         >>> Light("spot", 10.0, position_world=[0, 2, 0], direction_world=[0, -1, 0])
 
     Raises:
-        ValueError: the direction of a spot or directional light does not have unit length.
+        ValueError: the direction of a spot or directional light does not have unit length, or the range is
+            not positive.
     """
 
     kind: LightKind
@@ -179,6 +182,8 @@ class Light:
     inner_cone: float
     outer_cone: float
     name: str
+    range: float
+    """World units, > 0; infinite where the light does not end. A directional light ignores it."""
 
     def __init__(
         self,
@@ -189,6 +194,7 @@ class Light:
         inner_cone: float = 0.0,
         outer_cone: float = float(np.pi / 4),
         name: str = "",
+        range: float = math.inf,
     ) -> None:
         white = np.ones(3) if np.ndim(intensity) == 0 else 1.0
         values = {
@@ -199,6 +205,7 @@ class Light:
             "inner_cone": float(inner_cone),
             "outer_cone": float(outer_cone),
             "name": name,
+            "range": float(range),
         }
         for field_name, value in values.items():
             object.__setattr__(self, field_name, value)
@@ -209,6 +216,8 @@ class Light:
                 f"Light.direction_world: must be a unit vector, got {self.direction_world.tolist()} "
                 f"of length {length:.6g}"
             )
+        if not self.range > 0.0:
+            raise ValueError(f"Light.range: must be positive, got {self.range:g}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,6 +316,7 @@ def scaled_light(light: Light, factor: float) -> Light:
         inner_cone=light.inner_cone,
         outer_cone=light.outer_cone,
         name=light.name,
+        range=light.range * factor,
     )
 
 

@@ -13,6 +13,7 @@ from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import write_text_whole
 from vpltune.renderer.files.small_text import read_small_text
 from vpltune.renderer.scene.files.limits import LARGEST_NUMBER, LARGEST_RADIOMETRIC
+from vpltune.renderer.scene.light_range import checked_range
 from vpltune.renderer.scene.scene import Camera, Light, scaled_camera, scaled_light
 from vpltune.renderer.scene.spot_cone import checked_cone
 
@@ -68,8 +69,11 @@ def ray_directions_world(view: View) -> Float64[np.ndarray, "height width 3"]:
 
 
 def light_to_json(light: Light) -> dict[str, Any]:
-    """A light in the form of `views.json`. World units, W/sr or W/m², radians."""
-    return {
+    """A light in the form of `views.json`. World units, W/sr or W/m², radians.
+
+    `range` is there only where the light ends, so the keys of references without one stay what they were.
+    """
+    document = {
         "type": light.kind,
         "position": light.position_world.tolist(),
         "direction": light.direction_world.tolist(),
@@ -77,6 +81,9 @@ def light_to_json(light: Light) -> dict[str, Any]:
         "inner_cone": light.inner_cone,
         "outer_cone": light.outer_cone,
     }
+    if light.kind != "directional" and light.range < math.inf:
+        document["range"] = light.range
+    return document
 
 
 def _view_to_json(view: View) -> dict[str, Any]:
@@ -221,6 +228,8 @@ def light_from_json(entry: Any, where: str) -> Light:
     light: dict[str, Any] = {}
     if kind != "directional":
         light["position_world"] = _numbers(entry, "position", 3, where)
+        if "range" in entry:
+            light["range"] = checked_range(float(_numbers(entry, "range", 1, where)[0]), f"{where}.range")
     if kind != "point":
         direction = _numbers(entry, "direction", 3, where)
         length = np.linalg.norm(direction)

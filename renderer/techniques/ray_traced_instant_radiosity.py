@@ -12,6 +12,7 @@ from vpltune.renderer.frame.frame import Frame
 from vpltune.renderer.frame.frame_pass import FrameInputs
 from vpltune.renderer.frame.point_table import r2_sequence
 from vpltune.renderer.gpu.resources import Resources
+from vpltune.renderer.scene.light_range import range_falloff
 from vpltune.renderer.scene.scene import Light, Scene
 from vpltune.renderer.scene.spot_cone import cone_scale
 from vpltune.renderer.scene.transforms import transform_points
@@ -56,9 +57,8 @@ def traced_vpls(scene: Scene, lights: tuple[Light, ...], count: int) -> np.ndarr
         vpls["normal"][into] = normal
         vpls["area"][into] = area
         vpls["footprint"][into] = np.sqrt(area / np.pi)
-        vpls["flux"][into] = (
-            light.intensity * (_cone_falloff(light, direction[hit]) * share)[:, None] * albedo
-        )
+        left = _cone_falloff(light, direction[hit]) * range_falloff(light, distance[hit])
+        vpls["flux"][into] = light.intensity * (left * share)[:, None] * albedo
     return vpls
 
 

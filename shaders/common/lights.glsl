@@ -15,7 +15,9 @@ struct Light {
     vec4 position_kind;         // world position (not used by directional lights); kind
     vec4 direction_cone_scale;  // unit direction of travel; spot: 1 / (cos inner - cos outer)
     vec4 intensity_cos_outer;   // W/sr (directional: W/m² on a surface square to the beam); spot: cos outer
-    ivec4 faces;                // first face, number of faces; the rest is unused
+    ivec2 faces;                // first face, number of faces
+    float inverse_range;        // 1 / range [1 / world units]; 0 where the light does not end
+    float padding;
 };
 
 // One view of a light, drawn into one tile of the RSM atlas. A perspective face covers |xy| <= extent at unit depth. An
@@ -59,6 +61,16 @@ float cone_falloff(Light light, vec3 direction_from_light) {
     return ramp * ramp;
 }
 
+// Share of the light that is left at a distance: 1 - (d / range)⁴, 0 beyond the range, 1 without one
+// (KHR_lights_punctual, "Range Property").
+float range_falloff(Light light, float distance_squared) {
+    if (light.inverse_range == 0.0) {
+        return 1.0;
+    }
+    float ratio = distance_squared * light.inverse_range * light.inverse_range;
+    return max(1.0 - ratio * ratio, 0.0);
+}
+
 // Unit vector from a point towards the light.
 vec3 towards_light(Light light, vec3 position_world) {
     if (int(light.position_kind.w) == LIGHT_DIRECTIONAL) {
@@ -75,7 +87,7 @@ vec3 irradiance_facing(Light light, vec3 position_world) {
     vec3 from_light = position_world - light.position_kind.xyz;
     float distance_squared = max(dot(from_light, from_light), 1e-30);
     return light.intensity_cos_outer.rgb * cone_falloff(light, from_light * inversesqrt(distance_squared))
-         / distance_squared;
+         * range_falloff(light, distance_squared) / distance_squared;
 }
 
 // A world position in the face's own space.
@@ -86,7 +98,7 @@ vec3 world_to_face(RsmFace face, vec3 position_world) {
 // Whether a finer face of the same light shows a position. The faces of a directional light are nested, each in the one
 // before it (renderer/scene/sun_faces.py); the finest that shows a surface carries its flux, the others none.
 bool shown_finer(int face_index, vec3 position_world) {
-    ivec4 faces = lights[rsm_faces[face_index].light].faces;
+    ivec2 faces = lights[rsm_faces[face_index].light].faces;
     if (rsm_faces[face_index].orthographic == 0 || face_index + 1 >= faces.x + faces.y) {
         return false;
     }

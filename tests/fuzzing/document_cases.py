@@ -23,6 +23,7 @@ _SIDECAR: dict[str, Any] = {
             "intensity": 10.0,
             "inner_cone_degrees": 35.0,
             "outer_cone_degrees": 55.0,
+            "range": 8.0,
         },
         {"type": "point", "position": [0, 1, 0], "intensity": [1.0, 2.0, 3.0]},
         {"type": "directional", "direction": [0.0, -1.0, 0.1], "intensity": 2},
@@ -43,7 +44,7 @@ _VIEWS: dict[str, Any] = {
             "split": "fitted",
             "size": [64, 48],
             "camera": {"to_world": [1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 1, 5, 0, 0, 0, 1], "yfov": 0.9},
-            "lights": [_SPOT | {"inner_cone": 0.1, "outer_cone": 0.8}],
+            "lights": [_SPOT | {"inner_cone": 0.1, "outer_cone": 0.8, "range": 4.0}],
         },
         {
             "name": "second",

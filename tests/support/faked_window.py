@@ -51,6 +51,7 @@ SPOT = {
     "intensity": [4.0, 2.0, 1.0],
     "inner_cone": 0.3,
     "outer_cone": 0.6,
+    "range": 2.5,
 }
 
 

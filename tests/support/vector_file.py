@@ -1,6 +1,7 @@
 """docs/test_vectors.json as tests read it."""
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +42,8 @@ def light_of(document: dict[str, Any]) -> Light:
     names = {"position": "position_world", "direction": "direction_world"}
     placed = {name: np.array(document[key]) for key, name in names.items() if key in document}
     cones = {key: document[key] for key in ("inner_cone", "outer_cone") if key in document}
-    return Light(document["type"], np.array(document["intensity"]), **placed, **cones)
+    reach = document.get("range", math.inf)
+    return Light(document["type"], np.array(document["intensity"]), **placed, **cones, range=reach)
 
 
 def records_of(light: Light) -> LightRecords:

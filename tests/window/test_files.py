@@ -31,7 +31,7 @@ def test_what_is_saved_is_read_and_drawn_alike(talk, tmp_path, scene_file):
 
 
 def test_lights_are_saved_as_the_sidecar_that_the_next_window_reads(window, talk, scene_file, config_file):
-    light = dict(talk.state["lights"][0], intensity=[1.0, 2.0, 3.0])
+    light = dict(talk.state["lights"][0], intensity=[1.0, 2.0, 3.0], range=2.5)
     assert talk.edit(gesture=1, light=0, value=light)["unsaved_lights"]
     talk.look()
     talk.say("save", what="sidecar", path=None)
@@ -39,6 +39,7 @@ def test_lights_are_saved_as_the_sidecar_that_the_next_window_reads(window, talk
     saved = read_sidecar(scene_file.with_suffix(".vpltune.toml"))
     camera, lights = saved.camera, saved.lights
     assert lights is not None and lights[0].intensity.tolist() == [1.0, 2.0, 3.0]
+    assert lights[0].range == 2.5 and talk.state["lights"][0]["range"] == 2.5
     assert camera is not None
     assert np.allclose(camera.to_world.ravel(), talk.scene["camera"]["to_world"], atol=1e-6)
 

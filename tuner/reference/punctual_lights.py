@@ -5,6 +5,7 @@ import math
 import numpy as np
 from jaxtyping import Float32
 
+from vpltune.renderer.scene.light_range import inverse_range
 from vpltune.renderer.scene.scene import Light
 from vpltune.renderer.scene.spot_cone import cone_scale
 from vpltune.tuner.reference.directions import cone_direction, disc_point
@@ -37,7 +38,8 @@ class PunctualLights:
     def arriving(self, index, at: Surface):
         """How light `index` reaches each surface, without shadows.
 
-        E = I(ω)·max(0, cos θ)/d² for spot and point lights, E⊥·max(0, cos θ) for directional ones.
+        E = I(ω)·max(0, cos θ)·max(0, 1 − (d/range)⁴)/d² for spot and point lights, E⊥·max(0, cos θ) for
+        directional ones.
 
         Returns:
             Unit vector to the light; distance (1e30 for a directional light); irradiance E in W/m² on the
@@ -55,7 +57,10 @@ class PunctualLights:
         slant = w.dot(at.geometric_normal, to_light)
         paths = density[0] * w.maximum(slant, -slant) / squared
         reach = w.where(falloff[0] > 0.0, distance, 1e30)
-        return to_light, reach, intensity * (cone * cone * cosine / squared), paths
+        # Exactly 1 without a range: what such a light gives has every bit of before.
+        ratio = squared * density[2] * density[2]
+        left = w.maximum(1.0 - ratio * ratio, 0.0)
+        return to_light, reach, intensity * (cone * cone * cosine / squared * left), paths
 
     def irradiance(self, at: Surface, active, weight=None):
         """Irradiance from all lights in W/m², with shadows; 0 in lanes that are not `active`.
@@ -93,7 +98,8 @@ def _light_table(triangles: UnitTriangles, lights: tuple[Light, ...]) -> Float32
     1. unit direction in which it shines;
     2. intensity;
     3. (1, or 0 for a directional light; scale of the cone falloff; offset of the cone falloff);
-    4. (density of its paths per steradian, or per unit area of the beam; cosine of the widest angle; unused).
+    4. (density of its paths per steradian, or per unit area of the beam; cosine of the widest angle; inverse
+       of its range, 0 without one).
 
     The cone falloff is clamp(cos θ·scale + offset, 0, 1)², as in KHR_lights_punctual. Scale 0 and offset 1
     turn it off.
@@ -112,5 +118,5 @@ def _light_table(triangles: UnitTriangles, lights: tuple[Light, ...]) -> Float32
             scale = cone_scale(light.inner_cone, light.outer_cone)
             row[3, 1:] = scale, -least * scale
         area = BEAM_RADIUS**2 if at_infinity else 2.0 * (1.0 - least)
-        row[4] = [1.0 / (math.pi * area), least, 0.0]
+        row[4] = [1.0 / (math.pi * area), least, inverse_range(light, triangles.diagonal)]
     return table.astype(np.float32)

@@ -5,7 +5,7 @@
  * @typedef {{to_world: number[], yfov: number}} Camera  16 numbers row by row; radians
  * @typedef {"spot" | "point" | "directional"} LightType
  * @typedef {{name?: string, type: LightType, position: Vector, direction: Vector, intensity: Vector,
- *   inner_cone: number, outer_cone: number}} Light
+ *   inner_cone: number, outer_cone: number, range?: number}} Light
  * @typedef {"default" | "tuned" | "hand" | "auto" | "reference" | "signed_error" | "flip"} Source
  * @typedef {"default" | "tuned" | "hand" | "auto"} ConfigSource
  * @typedef {"a" | "b"} Pane

@@ -237,6 +237,8 @@ function lightBlocks(lights, faces) {
     floats(light, 64 * i + 32, [...entry.intensity, outer]);
     light.setInt32(64 * i + 48, faces.findIndex((other) => other.light === i), true);
     light.setInt32(64 * i + 52, faces.filter((other) => other.light === i).length, true);
+    // Only lights that end have a range.
+    light.setFloat32(64 * i + 56, entry.range ? 1 / entry.range : 0, true);
   });
   faces.forEach((entry, i) => {
     floats(face, 96 * i, [...columnMajor(entry.light_to_world), ...entry.extent, entry.near_or_range]);

@@ -8,7 +8,12 @@ from jaxtyping import Float64
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, label
 from vpltune.renderer.scene.files.gltf_document import GltfDocument
 from vpltune.renderer.scene.files.json_object import JsonObject
-from vpltune.renderer.scene.files.limits import LARGEST_NUMBER, LARGEST_RADIOMETRIC
+from vpltune.renderer.scene.files.limits import (
+    ENDLESS_RANGE,
+    LARGEST_NUMBER,
+    LARGEST_RADIOMETRIC,
+    SMALLEST_RANGE,
+)
 from vpltune.renderer.scene.scene import Camera, Light
 from vpltune.renderer.scene.spot_cone import checked_cone
 from vpltune.renderer.scene.transforms import without_scale
@@ -76,9 +81,11 @@ def read_light(
     most = LARGEST_RADIOMETRIC if kind == "directional" else LARGEST_NUMBER
     strength = light.number("intensity", 1.0, low=0.0, high=most)
     inner, outer = _cone(light, document) if kind == "spot" else (0.0, math.pi / 4)
+    reach = math.inf
     if kind != "directional" and "range" in light.members:
-        light.number("range")
-        document.warnings.add("a light's range is ignored: light falls off as 1/d² at any distance")
+        reach = light.number("range", low=SMALLEST_RANGE, high=LARGEST_NUMBER)
+        # Some write a very large number for a light that does not end.
+        reach = reach if reach < ENDLESS_RANGE else math.inf
     intensity = strength * color
     if intensity.max() > most:
         raise SceneFileError(f"{light.where}: color times intensity must be at most {most:g}")
@@ -97,6 +104,7 @@ def read_light(
         inner_cone=inner,
         outer_cone=outer,
         name=label(light.string("name", ""), light.where),
+        range=reach,
     )
 
 

@@ -89,6 +89,12 @@ LARGEST_UV = 1e9
 SMALLEST_EXTENT = 1e-12
 """Smallest diagonal of a scene in world units. A choice, like the largest coordinate."""
 
+SMALLEST_RANGE = 1.0 / LARGEST_NUMBER
+"""Smallest range of a light in world units. A choice: at whatever scale it is drawn, it stays above 0."""
+
+ENDLESS_RANGE = 1e18
+"""In world units. A choice: within `LARGEST_COORDINATE`, such a range takes less than rounding does."""
+
 LARGEST_RADIOMETRIC = 1e18
 """A choice: largest intensity of a light as it is drawn (`working_scale`), W/sr or W/m². Times any albedo and
 area it is finite in float32."""

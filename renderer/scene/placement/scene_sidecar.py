@@ -15,6 +15,7 @@ angles in degrees::
     intensity = 10.0            # W/sr (spot, point) or W/m² (directional): one number, or red, green, blue
     inner_cone_degrees = 35.0   # half angles, spot only
     outer_cone_degrees = 55.0
+    range = 8.0                 # where the light ends; not for a directional light
 
     [sky]
     radiance = [0.5, 0.6, 1.0]  # W/(m² sr), the same in all directions: one number, or red, green, blue
@@ -26,6 +27,7 @@ angles in degrees::
 `light = []` asks for no lights at all.
 """
 
+import dataclasses
 import math
 import tomllib
 from dataclasses import dataclass
@@ -39,6 +41,7 @@ from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.small_text import read_small_text
 from vpltune.renderer.scene.files.environment_file import ENVIRONMENT_SUFFIXES, is_environment_file
 from vpltune.renderer.scene.files.limits import LARGEST_NUMBER, LARGEST_RADIOMETRIC
+from vpltune.renderer.scene.light_range import checked_range
 from vpltune.renderer.scene.placement.automatic_camera import default_camera, default_camera_for_lights
 from vpltune.renderer.scene.placement.automatic_light import default_light
 from vpltune.renderer.scene.placement.given_sky import GivenSky
@@ -59,8 +62,8 @@ DEFAULT_CONE_DEGREES = {"inner_cone_degrees": 35.0, "outer_cone_degrees": 55.0}
 CAMERA_KEYS = ("eye", "look_at", "yfov_degrees")
 # The keys that each type of light may have; any other is rejected.
 LIGHT_KEYS: dict[LightKind, tuple[str, ...]] = {
-    "spot": ("type", "position", "direction", "look_at", "intensity", *DEFAULT_CONE_DEGREES),
-    "point": ("type", "position", "intensity"),
+    "spot": ("type", "position", "direction", "look_at", "intensity", "range", *DEFAULT_CONE_DEGREES),
+    "point": ("type", "position", "intensity", "range"),
     "directional": ("type", "direction", "look_at", "position", "intensity"),
 }
 # The keys that a sky may have.
@@ -193,11 +196,15 @@ def completed_camera_and_lights(
         return camera, lights, tuple(notes)
     if lights:
         space = space_of_view(scene, camera)
-        if lit_fraction(space, seen_by(space, camera), lights) >= LEAST_LIT:
+        sight = seen_by(space, camera)
+        reaches = "light reaches" if len(lights) == 1 else "lights reach"
+        # A range that ends before all that the camera sees is the file's own wish.
+        endless = tuple(dataclasses.replace(light, range=math.inf) for light in lights)
+        if lit_fraction(space, sight, endless) >= LEAST_LIT:
+            if lit_fraction(space, sight, lights) < LEAST_LIT:
+                notes.append(f"within range, the scene's {reaches} nothing the camera sees")
             return camera, lights, tuple(notes)
-        notes.append(
-            f"the scene's {'light reaches' if len(lights) == 1 else 'lights reach'} nothing the camera sees"
-        )
+        notes.append(f"the scene's {reaches} nothing the camera sees")
     light, note = default_light(scene, camera)
     return camera, (light,), (*notes, note)
 
@@ -280,6 +287,9 @@ def _light(table: Any, where: str) -> Light:
     placed: dict[str, Any] = {}
     if kind != "directional" or "look_at" in table:
         placed["position_world"] = _numbers(table, "position", (3,), where)
+    if "range" in table:
+        reach = float(_numbers(table, "range", (1,), where, LARGEST_NUMBER)[0])
+        placed["range"] = checked_range(reach, f"{where}: 'range'")
     if kind != "point":
         placed["direction_world"] = _direction(table, placed.get("position_world"), where)
     if kind == "spot":

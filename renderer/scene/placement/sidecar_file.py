@@ -123,6 +123,8 @@ def sidecar_text(camera: Camera | None, lights: Sequence[Light] | None, sky: Giv
         if light.kind == "spot":
             parts.append(f"inner_cone_degrees = {_number(math.degrees(light.inner_cone))}  # half angles")
             parts.append(f"outer_cone_degrees = {_number(math.degrees(light.outer_cone))}")
+        if light.kind != "directional" and light.range < math.inf:
+            parts.append(f"range = {_number(light.range)}")
     if sky is not None:
         parts += ["", "[sky]", *_sky_lines(sky)]
     return "\n".join(parts) + "\n"

@@ -138,6 +138,8 @@ def lit(space: FreeSpace, light: Light, points: Float64[np.ndarray, "n 3"]) -> B
         towards = offset / np.maximum(distance, 1e-9)[:, None]
         hits = march_from(space, place, towards)
     reached = hits.distance >= distance - SAME_PLACE
+    if light.kind != "directional":
+        reached &= distance < light.range / space.voxel_world
     if light.kind == "spot":
         reached &= towards @ light.direction_world > math.cos(light.outer_cone)
     return reached

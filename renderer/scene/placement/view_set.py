@@ -157,8 +157,12 @@ def _moved_light(space: FreeSpace, light: Light, amount: float, random: np.rando
     there = dataclasses.replace(light, position_world=space.to_world(moved), direction_world=direction)
     after = mean_square_distance_world(space, light_hits(space, there))
     if before > 0.0 and after > 0.0:
-        # Irradiance is proportional to intensity / mean square distance; keep it.
-        there = dataclasses.replace(there, intensity=light.intensity * (after / before))
+        # Irradiance is proportional to intensity / mean square distance; keep it, and where it ends.
+        there = dataclasses.replace(
+            there,
+            intensity=light.intensity * (after / before),
+            range=light.range * math.sqrt(after / before),
+        )
     return there
 
 

@@ -52,6 +52,7 @@ def _rich_scene() -> Scene:
                 np.array([0.6, -0.8, 0.0]),
                 0.1,
                 0.9,
+                range=2.5,
             ),
             Light("spot", np.ones(3), direction_world=np.array([0.0, -1.0, 0.0]), outer_cone=np.pi / 2),
             Light("point", np.array([0.0, 5e4, 1.0]), np.array([-1.0, 0.0, 0.0]), name="bulb"),
@@ -96,6 +97,7 @@ def test_everything_comes_back(tmp_path, scene):
         np.testing.assert_allclose(mine.intensity, other.intensity, rtol=1e-15)
         if mine.kind != "directional":
             np.testing.assert_array_equal(mine.position_world, other.position_world)
+            assert mine.range == other.range
         if mine.kind != "point":
             np.testing.assert_allclose(mine.direction_world, other.direction_world, atol=1e-15)
         if mine.kind == "spot":

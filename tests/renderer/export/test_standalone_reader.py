@@ -71,7 +71,12 @@ def test_the_image_is_the_runtimes(tmp_path, light, visibility):
 def test_several_lights_share_the_vpls(tmp_path):
     scene, view = colored_room(), room_view("spot", (64, 48))
     view = dataclasses.replace(
-        view, lights=(ROOM_LIGHTS["directional"], ROOM_LIGHTS["point"], ROOM_LIGHTS["spot"])
+        view,
+        lights=(
+            ROOM_LIGHTS["directional"],
+            dataclasses.replace(ROOM_LIGHTS["point"], range=0.8),
+            dataclasses.replace(ROOM_LIGHTS["spot"], range=2.0),
+        ),
     )
     config = with_resolution(CONFIG, 128)
     write_bundle(tmp_path, scene_bundle(scene, view, config))

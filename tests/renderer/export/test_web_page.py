@@ -149,8 +149,12 @@ def test_vpls_are_placed_by_what_the_camera_sees(opened, light):
 
 
 def test_it_goes_on_being_the_runtimes_when_things_move(opened):
-    """Camera and light by keys, parameters by a button; the runtime draws from where things then are."""
+    """Camera and light by keys, parameters by a button; the runtime draws from where things then are.
+
+    The spot ends at the floor, and so lights the walls alone that it meets before.
+    """
     scene, view = colored_room(), web_view("spot", (96, 72))
+    view = dataclasses.replace(view, lights=(dataclasses.replace(view.lights[0], range=2.2),))
     page = opened(page_text(scene, view))
     for key in ("ArrowLeft", "ArrowLeft", "ArrowUp", "+", "d", "d", "s"):
         page.keyboard.press(key)

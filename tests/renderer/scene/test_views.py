@@ -6,7 +6,7 @@ import math
 import pytest
 
 from vpltune.renderer.errors import InputError
-from vpltune.renderer.scene.views import read_views
+from vpltune.renderer.scene.views import light_to_json, read_views, write_views
 
 VIEW = {
     "name": "a",
@@ -32,6 +32,22 @@ def written(folder, text):
     return path
 
 
+def ranged(value):
+    return json.dumps({"views": [{**VIEW, "lights": [VIEW["lights"][0] | {"range": value}]}]})
+
+
+def test_a_range_comes_back_and_is_not_written_without_one(tmp_path):
+    """The text without a range is that of before: hashes of it are the keys of cached references."""
+    (view,) = read_views(written(tmp_path, ranged(2.5)))
+    assert view.lights[0].range == 2.5
+    write_views(tmp_path / "again.json", "scene.glb", (view,))
+    assert read_views(tmp_path / "again.json")[0].lights[0].range == 2.5
+    (plain,) = read_views(written(tmp_path, json.dumps({"views": [VIEW]})))
+    keys = ["type", "position", "direction", "intensity", "inner_cone", "outer_cone"]
+    assert list(light_to_json(plain.lights[0])) == keys
+    assert plain.lights[0].range == math.inf
+
+
 def test_a_byte_order_mark_and_a_hard_edge_are_read(tmp_path):
     (view,) = read_views(written(tmp_path, b"\xef\xbb\xbf" + json.dumps({"views": [VIEW]}).encode()))
     light = view.lights[0]
@@ -43,6 +59,10 @@ def test_a_byte_order_mark_and_a_hard_edge_are_read(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        (ranged(0), r"views\[0\]\.lights\[0\]\.range: must be positive, at least 1e-30, got 0"),
+        (ranged(-3), r"lights\[0\]\.range: must be positive"),
+        (ranged("far"), r"lights\[0\]\.range: must be 1 finite number, got 'far'"),
+        (ranged(None), r"lights\[0\]\.range: must be 1 finite number"),
         ("[" * 100_000, "nested too deep"),
         (json.dumps({"views": [VIEW]}).replace("[8, 6]", "[" * 900 + "]" * 900), "size: must be|nested too"),
         ("{", "not JSON"),

@@ -238,11 +238,13 @@ def test_arguments_out_of_range_are_refused(shapes, bad):
         reference_views(shapes.box_room(), (shapes.box_room_view((8, 6)),), **bad)
 
 
-@pytest.mark.parametrize("glows", [False, True])
-def test_scalar_fallback_agrees_within_noise(shapes, tmp_path, glows):
+@pytest.mark.parametrize("change", ["none", "glows", "lights end"])
+def test_scalar_fallback_agrees_within_noise(shapes, tmp_path, change):
     """Without LLVM, the same rays with the same randomisation are traced: results agree far below noise."""
     scene, view = shapes.box_room(), shapes.box_room_view((16, 12))
-    if glows:
+    if change == "lights end":
+        view = shapes.box_room_view((16, 12), (replace(shapes.spot(), range=2.0), shapes.sun()))
+    if change == "glows":
         materials = (replace(scene.materials[0], emission=(0.2, 0.1, 0.3)), *scene.materials[1:])
         scene = replace(scene, materials=materials, environment=even_sky((0.3, 0.2, 0.1)))
     arguments = {"seed": 3, "noise_target": 0.0, "max_samples": 32, "bounces": 2}

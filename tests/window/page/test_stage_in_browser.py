@@ -103,8 +103,8 @@ def test_an_arrow_moves_a_light_along_its_axis_only(window):
     # axis by 25 pixels, and seen from above the nearest point lies up to 1 % farther back.
     height = page.locator("#stage").bounding_box()["height"]
     assert light["position"][0] == pytest.approx(60 * 2 * 5 * np.tan(0.5) / height, rel=1e-2)
-    assert {key: light[key] for key in ("direction", "intensity")} == {
-        key: SPOT[key] for key in ("direction", "intensity")
+    assert {key: light[key] for key in ("direction", "intensity", "range")} == {
+        key: SPOT[key] for key in ("direction", "intensity", "range")
     }
 
 

@@ -71,6 +71,13 @@ def test_point_and_directional(triangle, kind):
         ({"spot": {"outerConeAngle": 2}}, r"lights\[0\]\.spot: cone angles must satisfy"),
         ({"spot": {"outerConeAngle": 0}}, r"lights\[0\]\.spot: cone angles must satisfy"),
         ({"spot": {"innerConeAngle": -0.1}}, r"lights\[0\]\.spot: cone angles must satisfy"),
+        (
+            {"range": 0},
+            r"lights\[0\]\.range: must be a finite number from 1e-30 to 1e\+30, got 0",
+        ),
+        ({"range": -2.5}, r"lights\[0\]\.range: must be a finite number from 1e-30 .*, got -2\.5"),
+        ({"range": "far"}, r"lights\[0\]\.range: must be a finite number"),
+        ({"range": None}, r"lights\[0\]\.range: must be a finite number"),
     ],
 )
 def test_lights_out_of_range_are_refused(triangle, change, message):
@@ -89,11 +96,23 @@ def test_equal_cone_angles_are_a_hard_edge_with_a_word(triangle):
     assert scene.warnings == ("1 spot has equal cone angles; it has a hard edge",)
 
 
-def test_range_is_left_aside_aloud(triangle):
-    path = with_light(triangle, {"type": "point", "range": 5})
-    assert read_scene(path).warnings == (
-        "a light's range is ignored: light falls off as 1/d² at any distance",
-    )
+@pytest.mark.parametrize("kind", ["point", "spot"])
+def test_a_range_is_read_whatever_the_scale_of_the_node(triangle, kind):
+    """KHR_lights_punctual: scale does not affect a light."""
+    scene = read_scene(with_light(triangle, {"type": kind, "range": 5}, scale=[3, 3, 3]))
+    assert scene.lights[0].range == 5.0
+    assert scene.warnings == ()
+
+
+def test_without_a_range_or_with_a_vast_one_light_does_not_end(triangle):
+    for light in ({"type": "point"}, {"type": "point", "range": 1e30}):
+        (point,) = read_scene(with_light(triangle, light)).lights
+        assert point.range == np.inf
+
+
+def test_the_range_of_a_sun_is_passed_over(triangle):
+    (sun,) = read_scene(with_light(triangle, {"type": "directional", "range": -1})).lights
+    assert sun.range == np.inf
 
 
 def test_a_light_that_is_not_there_is_refused(triangle):

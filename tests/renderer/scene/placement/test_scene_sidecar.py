@@ -1,5 +1,6 @@
 """The sidecar beside a scene, and the precedence of flags, sidecar, scene file and automatic choice."""
 
+import dataclasses
 import math
 import os
 from pathlib import Path
@@ -176,6 +177,16 @@ def test_a_light_of_the_file_that_lights_nothing_in_sight_is_replaced_and_that_i
     assert "light chosen automatically" in notes[1]
 
 
+def test_a_light_of_the_file_that_ends_before_all_in_sight_is_kept_and_that_is_said(tmp_path):
+    """Without its range, the same light reaches most of the room."""
+    view = room_view("point")
+    light = dataclasses.replace(view.lights[0], range=0.1)
+    scene = with_lights(colored_room(), light)
+    _, lights, notes = resolve_camera_and_lights(scene, tmp_path / "room.glb", view.camera, None)
+    assert lights == (light,)
+    assert "within range, the scene's light reaches nothing the camera sees" in notes
+
+
 def test_a_scene_without_triangles_is_refused(tmp_path):
     with pytest.raises(InputError, match="must have at least one triangle, got none"):
         resolve_camera_and_lights(Scene("empty", (), (), ()), tmp_path / "empty.glb", None, None)
@@ -246,7 +257,10 @@ def test_a_folder_that_changed_is_listed_again(tmp_path):
 
 def test_what_is_written_reads_back(tmp_path):
     sidecar = read_sidecar(
-        written(tmp_path, CAMERA + SPOT + '[[light]]\ntype = "point"\nposition = [1, 2, 3]\nintensity = 4\n')
+        written(
+            tmp_path,
+            CAMERA + SPOT + '[[light]]\ntype = "point"\nposition = [1, 2, 3]\nintensity = 4\nrange = 2.5\n',
+        )
     )
     camera, lights = sidecar.camera, sidecar.lights
     path = tmp_path / "again.vpltune.toml"
@@ -256,7 +270,7 @@ def test_what_is_written_reads_back(tmp_path):
     np.testing.assert_allclose(again.to_world, camera.to_world, atol=1e-5)
     assert again.yfov == pytest.approx(camera.yfov, rel=1e-6)
     for one, other in zip(lights, lights_again, strict=True):
-        assert one.kind == other.kind
+        assert (one.kind, one.range) == (other.kind, other.range)
         np.testing.assert_allclose(one.position_world, other.position_world, atol=1e-5)
         np.testing.assert_allclose(one.direction_world, other.direction_world, atol=1e-6)
         np.testing.assert_allclose(one.intensity, other.intensity, rtol=1e-6)

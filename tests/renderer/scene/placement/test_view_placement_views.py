@@ -1,5 +1,7 @@
 """Sets of views: moved from the start, in free space, lit, and reproducible from the seed."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from built_scenes import colored_room, room_view
@@ -108,6 +110,18 @@ def test_moved_lights_keep_kind_cones_and_irradiance(path):
         irradiance = light.intensity / mean_square_distance_world(space, light_hits(space, light))
         before = first.intensity / mean_square_distance_world(space, light_hits(space, first))
         assert irradiance == pytest.approx(before, rel=1e-9)
+
+
+def test_the_range_of_a_moved_light_grows_as_its_distances_do():
+    """Their squares are in the ratio of the intensities: the light gives what it gave, and ends as it did."""
+    view = room_view("point")
+    first = dataclasses.replace(view.lights[0], range=2.0)
+    scene = colored_room()
+    views = views_for_scene(scene, view.camera, (first,), fitted=3, held_out=0, size=SIZE, seed=0)
+    lights = [other.lights[0] for other in views]
+    assert len({light.range for light in lights}) == 3
+    for light in lights:
+        assert (light.range / 2.0) ** 2 == pytest.approx(light.intensity[0] / first.intensity[0], rel=1e-9)
 
 
 def test_the_seed_decides_and_more_views_leave_the_others_alone():

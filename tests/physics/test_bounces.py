@@ -86,6 +86,15 @@ def test_a_furnace_gives_the_geometric_series(gl_context, albedo, bounces):
     np.testing.assert_allclose(reflected, series * np.pi * RADIANCE, rtol=2.5e-2)
 
 
+@pytest.mark.parametrize("albedo", [0.5, 0.8, 0.9])
+def test_many_discs_leave_less_in_the_corners(gl_context, albedo):
+    """πL/(1 − ρ) with 2,048 VPLs, 1,024 of them on the walls as they glow, to 2 %."""
+    config = config_of("all", parameters=ArtistParameters(vpl_count=2048))
+    captured = drawn(gl_context, box(albedo, RADIANCE), view_inside(), config)
+    irradiance = (captured.direct_irradiance + captured.indirect_irradiance)[captured.valid].mean(axis=0)
+    np.testing.assert_allclose(irradiance, np.pi * RADIANCE / (1.0 - albedo), rtol=2e-2)
+
+
 @pytest.mark.parametrize("albedo", [0.3, 0.7])
 def test_bounces_in_a_box_fall_by_the_albedo(gl_context, albedo):
     """A lamp in a closed box: all light that is reflected arrives, so that each bounce has ρ times the flux

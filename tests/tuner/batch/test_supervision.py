@@ -152,13 +152,15 @@ def test_the_process_dies_with_its_parent(supervised, make_job, tmp_path):
 def test_refused_scenes_get_a_record_each_from_real_processes(make_job):
     """Two real tuning processes get files that are not scenes: no retries, and no claims left."""
     jobs = [make_job(f"room{index}.glb") for index in range(5)]
+    # An earlier test may have left the driver of a browser.
+    before = set(psutil.Process().children(recursive=True))
     events = list(tune_locally(jobs, 2, 1, Limits(math.inf, 8 << 30)))
     records = [event for event in events if event["event"] == "record"]
     assert {record["status"] for record in records} == {"refused"}
     assert {record["attempts"] for record in records} == {1}
     assert sorted(record["name"] for record in records) == [job.name for job in jobs]
     assert not list((Path(jobs[0].folder) / "claims").iterdir())
-    assert not psutil.Process().children(recursive=True)
+    assert set(psutil.Process().children(recursive=True)) <= before
 
 
 def test_the_command_refuses_resumes_and_reports(tmp_path, capfd):

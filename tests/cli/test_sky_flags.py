@@ -39,3 +39,8 @@ def test_a_view_of_a_file_takes_a_sky_but_no_camera(tmp_path):
     assert not ViewFlags(sky="1").place_a_view
     assert ViewFlags(sky="1", eye="0,0,0").place_a_view
     assert chosen_view(None, None, None, ViewFlags(sky="1")).sky == GivenSky((1.0, 1.0, 1.0))
+
+
+def test_a_map_that_is_not_there_is_named():
+    with pytest.raises(InputError, match="^--environment: 'no.hdr': cannot be read"):
+        GivenSky(file="no.hdr").environment(None, "--environment")

@@ -43,7 +43,7 @@ def hdr_pixels(content: bytes, where: str) -> Float32[np.ndarray, "height width 
     line, newline, _ = content[at : at + 40].partition(b"\n")
     found = _RESOLUTION.fullmatch(line)
     if found is None or not newline:
-        raise SceneFileError(f"{where}: must have a line like -Y 512 +X 1024, got {line!r:.60}")
+        raise SceneFileError(f"{where}: must have a line like -Y 512 +X 1024, got {_shown(line)}")
     height, width = int(found[1]), int(found[2])
     # The fewest bytes of a row: a marker of four, and 127 pixels of one component for each two.
     fewest = height * min(4 * width, 4 + 8 * -(-width // 127))
@@ -62,13 +62,17 @@ def hdr_pixels(content: bytes, where: str) -> Float32[np.ndarray, "height width 
     return pixels[..., :3] * scale[pixels[..., 3]][..., None]
 
 
+def _shown(text: bytes) -> str:
+    return f"{text.decode('latin-1')!r:.60}"
+
+
 def _exposure(lines: list[bytes], where: str) -> float:
     """The product of all EXPOSURE lines, by which pixels were multiplied."""
     exposure = 1.0
     for line in lines:
         key, equals, value = line.partition(b"=")
         if key == b"FORMAT" and value.strip() != b"32-bit_rle_rgbe":
-            raise SceneFileError(f"{where}: FORMAT must be 32-bit_rle_rgbe, got {value!r:.60}")
+            raise SceneFileError(f"{where}: FORMAT must be 32-bit_rle_rgbe, got {_shown(value)}")
         if key == b"EXPOSURE" and equals:
             try:
                 exposure *= plain_number(value.decode("ascii", "replace"))
@@ -76,7 +80,7 @@ def _exposure(lines: list[bytes], where: str) -> float:
                 exposure = 0.0
             # A choice: beyond these, a pixel that is left has no digits in single precision.
             if not 1e-12 <= exposure <= 1e12:
-                raise SceneFileError(f"{where}: EXPOSURE must be from 1e-12 to 1e12, got {value!r:.60}")
+                raise SceneFileError(f"{where}: EXPOSURE must be from 1e-12 to 1e12, got {_shown(value)}")
     return exposure
 
 

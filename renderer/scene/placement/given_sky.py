@@ -49,7 +49,8 @@ class GivenSky:
             with np.errstate(all="ignore"):
                 planes = environment_planes(content, self.file, self.scale, f"{where}: {self.file!r:.80}")
         except SceneFileError as error:
-            said = f"{where}: {error}" if scene_path is None and not str(error).startswith(where) else error
+            named = scene_path is not None or str(error).startswith(where)
+            said = error if named else f"{where}: {self.file!r:.80}: {error}"
             raise InputError(one_line(str(said), 4096)) from error
         if not any(plane.any() for plane in planes):
             return None

@@ -25,7 +25,7 @@ from vpltune.renderer.frame.passes.geometry import GeometryPass
 from vpltune.renderer.frame.passes.glowing_surfaces import GlowingSurfacesPass
 from vpltune.renderer.frame.passes.interleaved_filter import InterleavedFilterPass, NearFieldFilterPass
 from vpltune.renderer.frame.passes.joined_vpls import JoinedVplsPass
-from vpltune.renderer.frame.passes.light_walks import WALKS, LightWalksPass, walk_table
+from vpltune.renderer.frame.passes.light_walks import LightWalksPass, walk_table
 from vpltune.renderer.frame.passes.material_resolve import MaterialResolvePass
 from vpltune.renderer.frame.passes.receiver_bounds import ReceiverBoundsPass
 from vpltune.renderer.frame.passes.reflective_shadow_map import ReflectiveShadowMapPass
@@ -46,6 +46,7 @@ from vpltune.renderer.frame.rsm_resolution import rsm_resolution
 from vpltune.renderer.frame.runtime_options import RuntimeOptions
 from vpltune.renderer.frame.visibility_map_layout import VisibilityMapLayout
 from vpltune.renderer.frame.vpl_pools import DiscPool, VplPools
+from vpltune.renderer.frame.walk_samples import WALKS
 from vpltune.renderer.gpu.camera_uniforms import CameraUniforms, camera_uniforms
 from vpltune.renderer.gpu.glowing_triangles import GlowingTriangles
 from vpltune.renderer.gpu.ray_hierarchy import RayHierarchy

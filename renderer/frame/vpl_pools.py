@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 from vpltune.renderer.config.artist_parameters import LARGEST_DISC_COUNT
-from vpltune.renderer.frame.disc_samples import sample_count
+from vpltune.renderer.frame.disc_samples import SAMPLES_OF_DISC, sample_count
+from vpltune.renderer.frame.walk_samples import WALKS, recorded_steps
 
 VPL_BYTES = 48
 """Bytes of a VPL: `shaders/common/virtual_point_lights.glsl`."""
@@ -36,11 +37,17 @@ class VplPools:
             glows: whether a surface glows.
             bounces: reflections before light reaches the receiver; None for all.
         """
+        # A disc of a single sample has no more than that sample's own guess of an area.
+        samples = WALKS * recorded_steps(bounces, has_lamps=has_lights, glows=glows)
+        most = min(LARGEST_DISC_COUNT, samples // SAMPLES_OF_DISC)
+        if not has_lights and not glows:
+            return cls(count)
+        later = min(most, max(1, round(LATER_SHARE * count)))
         if not glows:
-            return cls(count, later=0 if bounces == 1 or not has_lights else _share(LATER_SHARE, count))
+            return cls(count, later)
         glowing = _share(GLOWING_SHARE, count)
         # One VPL stays where there is no lamp: a buffer cannot be empty. It has no flux.
-        return cls(count, _share(LATER_SHARE, count), glowing) if has_lights else cls(1, count, glowing)
+        return cls(count, later, glowing) if has_lights else cls(1, min(most, count), glowing)
 
     @property
     def asked(self) -> int:

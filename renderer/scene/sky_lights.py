@@ -17,8 +17,11 @@ from vpltune.renderer.scene.environment import Environment
 from vpltune.renderer.scene.scene import Light
 from vpltune.renderer.scene.sky_parts import SkyParts, median_cut, part_middles, sky_parts
 
-RAYS_OF_A_PART = 32
-"""Directions that a part is cut into, at most. A choice: 1,024 for 32 parts, of which a pixel takes 16."""
+RAYS = 1024
+"""Directions that all parts together are cut into, about; fewer where the sky has fewer lit texels. A choice:
+a pixel takes 16 of them."""
+LEAST_RAYS_OF_A_PART = 32
+"""Directions that a part is cut into, at most, where there are many parts. A choice."""
 _NARROW = 0.06
 """Widest half angle in radians of a part with hard shadows. A choice, 3.4°: about one texel of the map
 that is cut, which is all that is known of a sun's size."""
@@ -29,7 +32,7 @@ _ORIENTATIONS = 400
 _RIDGE = 1e-3
 """Weight of a factor's change beside the relative squared error. A choice: changes of some percent."""
 _MOST_CHANGE = 0.3
-"""Largest change of a factor. A choice."""
+"""Largest change of a factor; of a smaller part, its half angle. A choice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +59,9 @@ def sky_lights(environment: Environment, count: int) -> SkyLights:
     if not parts.count:
         return SkyLights()
     middles = parts.middles()
-    weights = _weights(parts, middles)
-    narrow = _narrow(parts, middles)
+    angles = _half_angles(parts, middles)
+    narrow = angles <= _NARROW
+    weights = _weights(parts, middles, np.where(narrow, 0.0, np.minimum(angles, _MOST_CHANGE)))
     fluxes = [weight * parts.flux[parts.owner == i].sum(axis=0) for i, weight in enumerate(weights)]
     # A stable order: the narrow ones first.
     lights = tuple(
@@ -68,11 +72,11 @@ def sky_lights(environment: Environment, count: int) -> SkyLights:
     return SkyLights(lights, int(narrow.sum()), towards, flux)
 
 
-def _narrow(parts: SkyParts, middles: Float64[np.ndarray, "parts 3"]) -> Bool[np.ndarray, " parts"]:
-    """Whether a part is narrow, by the even disc of sky with the same mean cosine, (1 + cos θ)/2."""
+def _half_angles(parts: SkyParts, middles: Float64[np.ndarray, "parts 3"]) -> Float64[np.ndarray, " parts"]:
+    """Half angle in radians of the even disc of sky with a part's mean cosine, which is (1 + cos θ)/2."""
     cosines = (parts.directions * middles[parts.owner]).sum(axis=1)
     mean = np.bincount(parts.owner, parts.power * cosines) / np.bincount(parts.owner, parts.power)
-    return 2.0 * mean - 1.0 >= np.cos(_NARROW)
+    return np.arccos(np.clip(2.0 * mean - 1.0, -1.0, 1.0))
 
 
 def _rays(
@@ -80,10 +84,12 @@ def _rays(
 ) -> tuple[Float32[np.ndarray, "rays 3"], Float32[np.ndarray, "rays 3"]]:
     towards: list[np.ndarray] = [np.zeros((0, 3))]
     flux: list[np.ndarray] = [np.zeros((0, 3))]
-    for part in _chained(parts.middles(), np.flatnonzero(~narrow)):
+    wide = np.flatnonzero(~narrow)
+    most = max(LEAST_RAYS_OF_A_PART, RAYS // max(1, len(wide)))
+    for part in _chained(parts.middles(), wide):
         own = parts.owner == part
         directions, own_flux, power = parts.directions[own], parts.flux[own], parts.power[own]
-        piece = median_cut(directions, power, RAYS_OF_A_PART)
+        piece = median_cut(directions, power, most)
         towards.append(part_middles(directions, power, piece))
         flux.append(np.stack([np.bincount(piece, own_flux[:, channel]) for channel in range(3)], axis=1))
     return np.concatenate(towards).astype(np.float32), np.concatenate(flux).astype(np.float32)
@@ -100,10 +106,13 @@ def _chained(middles: Float64[np.ndarray, "parts 3"], chosen: Int64[np.ndarray, 
     return chain
 
 
-def _weights(parts: SkyParts, middles: Float64[np.ndarray, "parts 3"]) -> Float64[np.ndarray, " parts"]:
+def _weights(
+    parts: SkyParts, middles: Float64[np.ndarray, "parts 3"], most: Float64[np.ndarray, " parts"]
+) -> Float64[np.ndarray, " parts"]:
     """Factors of the lights' power, by least squares over the irradiance of surfaces of many orientations.
 
-    Ridge regression (Hoerl and Kennard 1970) towards 1.
+    Ridge regression (Hoerl and Kennard 1970) towards 1, from which a factor differs by `most` at most: the
+    middle of a small part is as good as the part.
     """
     axes = np.concatenate([np.eye(3), -np.eye(3)])
     normals = np.concatenate([_even_directions(_ORIENTATIONS), axes])
@@ -123,7 +132,7 @@ def _weights(parts: SkyParts, middles: Float64[np.ndarray, "parts 3"]) -> Float6
     matrix, missing = given / scale, (wanted - given.sum(axis=1)) / scale
     weighted = matrix.T * (counts / counts.sum())
     change = np.linalg.solve(weighted @ matrix + _RIDGE * np.eye(len(middles)), weighted @ missing)
-    return 1.0 + np.clip(change, -_MOST_CHANGE, _MOST_CHANGE)
+    return 1.0 + np.clip(change, -most, most)
 
 
 def _even_directions(count: int) -> Float64[np.ndarray, "count 3"]:

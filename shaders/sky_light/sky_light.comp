@@ -3,7 +3,7 @@
 // Reads: G-buffer, ray hierarchy, sky rays, open irradiance. Writes: irradiance [W/m²], alpha 1 where a surface is.
 // Constants: SKY_LIFT, OPEN_NODES. Python: renderer/frame/passes/sky_light.py.
 //
-// The rays are shared out among the 8×8 pixels of a block: each pixel takes every 64th. A window of the filter holds each
+// The rays are shared out among the 8×8 pixels of a block: each pixel takes every 64th, or more where there are few. A window of the filter holds each
 // ray once, so that what it shows has shadows from all of them. What a pixel gets is a ratio: the share of its own rays'
 // light that arrives, of all that would arrive in the open. So open places have no noise, nor do borders of the image.
 #include "common/gbuffer.glsl"
@@ -28,8 +28,7 @@ layout(std430, binding = SKY_OPEN_BINDING) readonly buffer SkyOpen {
 
 uniform float longest;  // the scene's diagonal [world units]
 uniform int ray_count;
-
-const int BLOCK_PIXELS = 64;  // 8 × 8: BLOCK of renderer/frame/passes/sky_light.py
+uniform int stride;  // from one of a pixel's rays to its next: a power of two, at most the 64 pixels of a block
 
 // Irradiance in the open on a surface with this normal.
 vec3 open_irradiance(vec3 normal) {
@@ -64,7 +63,7 @@ void main() {
         vec3 origin = receiver.position_world + receiver.normal_world * (SKY_LIFT * away);
         vec3 arriving = vec3(0.0);
         vec3 sent = vec3(0.0);
-        for (int i = place_in_block(pixel); i < ray_count; i += BLOCK_PIXELS) {
+        for (int i = place_in_block(pixel) % stride; i < ray_count; i += stride) {
             vec3 towards = sky_rays[i].towards.xyz;
             float cosine = dot(receiver.normal_world, towards);
             if (cosine <= 0.0) {

@@ -210,3 +210,14 @@ def test_another_placement_has_walks_of_its_own(gl_context):
         np.testing.assert_array_equal(captured.vpl_flux, alone.vpl_flux)
         np.testing.assert_array_equal(captured.indirect_irradiance, alone.indirect_irradiance)
     assert (together[0].vpl_position_world[128:] != together[1].vpl_position_world[128:]).any()
+
+
+@pytest.mark.parametrize("bounces", [1, 2])
+@pytest.mark.parametrize("count", [4095, 4096, 20000])
+def test_many_vpls_of_glowing_walls_have_all_light_too(gl_context, count, bounces):
+    """As many discs as there are samples would have none to be made of. To 3 % of what 512 VPLs give: their
+    discs miss more of the corners."""
+    scene, view = box(0.5, RADIANCE), view_inside()
+    few = indirect(gl_context, scene, view, config_of(bounces))
+    many = indirect(gl_context, scene, view, config_of(bounces, parameters=ArtistParameters(vpl_count=count)))
+    np.testing.assert_allclose(many, few, rtol=3e-2)

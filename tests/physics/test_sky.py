@@ -140,6 +140,29 @@ def test_under_a_table_it_is_dark_by_what_the_table_hides(gl_context):
     assert np.sqrt(((got - expected) ** 2).mean()) < 0.05 * expected.mean()
 
 
+@pytest.mark.parametrize(("half_angle", "elevation"), [(0.03, 90), (0.08, 45), (0.12, 10), (0.3, 10)])
+def test_a_bright_patch_in_a_black_sky_has_all_of_its_light(gl_context, half_angle, elevation):
+    """A disc of a few texels: every pixel of open ground gets it, to 1 %."""
+    directions = texel_directions(128, 256)
+    up = np.radians(elevation)
+    lit = directions @ np.array([0.0, np.sin(up), -np.cos(up)]) > np.cos(half_angle)
+    radiance = np.where(lit, 10.0, 0.0)[..., None] * np.ones(3)
+    power = radiance[..., 0] * solid_angles(128, 256)[:, None]
+    expected = (power * np.maximum(directions[..., 1], 0.0)).sum()
+    ground = scene_of([quad((-10, 0, -10), (0, 0, 20), (20, 0, 0))], [(0.5,) * 3])
+    scene = replace(ground, environment=Environment(radiance.astype(np.float32)))
+    frame = Runtime(scene, context=gl_context).capture(view_from((0.0, 3.0, 0.01)), config_of(32), maps=False)
+    np.testing.assert_allclose(frame.direct_irradiance[frame.valid], expected, rtol=1e-2)
+
+
+@pytest.mark.parametrize("lights", [1, 3, 256])
+def test_few_and_many_lights_are_of_one_sky(gl_context, lights):
+    """Open ground, to 2 %: direct light does not depend on how many lights stand for a sky."""
+    scene = under_sky([quad((-10, 0, -10), (0, 0, 20), (20, 0, 0))])
+    got = direct_over_radiance(gl_context, scene, view_from((0.0, 3.0, 0.01)), lights)
+    np.testing.assert_allclose(got, np.pi, rtol=0.02)
+
+
 @pytest.mark.parametrize("seed", [0, 1])
 def test_rays_and_narrow_lights_have_all_of_the_light(seed):
     """Of any map, to the rounding of float32: what is not a narrow part's comes along rays."""

@@ -6,16 +6,11 @@ from jaxtyping import Float32
 from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
 from vpltune.renderer.frame.visibility_map_layout import FRAME_TURNS_OVER
 from vpltune.renderer.frame.vpl_pools import VPL_BYTES, DiscPool
+from vpltune.renderer.frame.walk_samples import WALKS, recorded_steps, walk_steps
 from vpltune.renderer.gpu.gpu_program import ComputeProgram
 from vpltune.renderer.gpu.ray_hierarchy import RayHierarchy
 from vpltune.renderer.gpu.resources import Resources
 
-WALKS = 4096
-"""Walks of a frame. A choice of 2,048, 4,096 and 8,192: in eight generated rooms the mean relMSE is 0.016,
-0.011 and 0.013 (docs/design_decisions.md, All the light)."""
-STEPS_OF_ALL = 8
-"""Reflections that a walk records where it stands for all of them. The last is one of all that would follow,
-with the flux of them all. A choice: at an albedo of 0.5, one part in 128 is left for it."""
 SURVIVAL = 0.95
 """Largest chance that a walk goes on after its last step, else the albedo. A choice, as of the reference."""
 MOST_RAYS = 64
@@ -35,12 +30,6 @@ def walk_table(count: int) -> Float32[np.ndarray, "count 4"]:
     steps = _ROOT ** -np.arange(1.0, 5.0)
     points = ((0.5 + np.arange(1, count + 1)[:, None] * steps) % 1.0).astype(np.float32)
     return np.minimum(points, np.nextafter(np.float32(1), np.float32(0)))
-
-
-def walk_steps(bounces: int | None) -> tuple[int, int]:
-    """Reflections that a walk records: one from the RSM, where light was reflected once, and one from a
-    surface that glows. `bounces` None is all."""
-    return (STEPS_OF_ALL, STEPS_OF_ALL) if bounces is None else (bounces - 1, bounces)
 
 
 class LightWalksPass(FramePass):
@@ -65,7 +54,7 @@ class LightWalksPass(FramePass):
         self._disc_count = disc_count
         self._hierarchy = hierarchy
         self._lamp_steps, self._glowing_steps = walk_steps(bounces)
-        steps = max(self._lamp_steps if has_lamps else 0, self._glowing_steps if glowing else 0)
+        steps = recorded_steps(bounces, has_lamps=has_lamps, glows=glowing is not None)
         self.sample_count = WALKS * steps
         """Samples that it leaves, dark ones included."""
         context = resources.context

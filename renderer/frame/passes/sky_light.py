@@ -13,6 +13,8 @@ from vpltune.renderer.scene.sky_lights import SkyLights
 
 BLOCK = 8
 """Pixels along the side of a block that shares the rays out. A choice: 1,024 rays are then 16 a pixel."""
+LEAST_RAYS = 12
+"""Rays of a pixel, at least: of fewer, all might lie below its horizon. A choice."""
 LIFT = 2e-5
 """A ray starts so far above its surface, in diagonals of the scene or distances from the camera. A choice:
 the G-buffer's depth has 7 digits."""
@@ -34,6 +36,9 @@ class SkyLightPass(FramePass):
     def __init__(self, resources: Resources, hierarchy: RayHierarchy, sky: SkyLights, target: str):
         self._hierarchy = hierarchy
         self._count = len(sky.ray_flux)
+        self._stride = BLOCK**2
+        while self._stride > 1 and self._count < LEAST_RAYS * self._stride:
+            self._stride //= 2
         rays = np.zeros((self._count, 2, 4), np.float32)
         rays[:, 0, :3], rays[:, 1, :3] = sky.ray_towards, sky.ray_flux
         resources["sky_rays"] = resources.context.buffer(rays.tobytes())
@@ -63,5 +68,7 @@ class SkyLightPass(FramePass):
         """Cast the rays, and join the pixels' shares."""
         self._hierarchy.update()
         camera = inputs.camera.uniforms
-        self._program.dispatch(*self._groups, **camera, longest=inputs.scene_diagonal, ray_count=self._count)
+        self._program.dispatch(
+            *self._groups, **camera, longest=inputs.scene_diagonal, ray_count=self._count, stride=self._stride
+        )
         self._filter.draw(inputs)

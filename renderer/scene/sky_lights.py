@@ -21,7 +21,7 @@ RAYS = 1024
 """Directions that all parts together are cut into, about; fewer where the sky has fewer lit texels. A choice:
 a pixel takes 16 of them."""
 LEAST_RAYS_OF_A_PART = 32
-"""Directions that a part is cut into, at most, where there are many parts. A choice."""
+"""Rays that a part has however many parts there are, unless it has fewer texels. A choice."""
 _NARROW = 0.06
 """Widest half angle in radians of a part with hard shadows. A choice, 3.4°: about one texel of the map
 that is cut, which is all that is known of a sun's size."""
@@ -68,7 +68,7 @@ def sky_lights(environment: Environment, count: int) -> SkyLights:
         Light("directional", fluxes[i], direction_world=-middles[i], name="sky")
         for i in np.argsort(~narrow, kind="stable")
     )
-    towards, flux = _rays(parts, narrow)
+    towards, flux = _rays(parts, middles, narrow)
     return SkyLights(lights, int(narrow.sum()), towards, flux)
 
 
@@ -80,13 +80,13 @@ def _half_angles(parts: SkyParts, middles: Float64[np.ndarray, "parts 3"]) -> Fl
 
 
 def _rays(
-    parts: SkyParts, narrow: Bool[np.ndarray, " parts"]
+    parts: SkyParts, middles: Float64[np.ndarray, "parts 3"], narrow: Bool[np.ndarray, " parts"]
 ) -> tuple[Float32[np.ndarray, "rays 3"], Float32[np.ndarray, "rays 3"]]:
     towards: list[np.ndarray] = [np.zeros((0, 3))]
     flux: list[np.ndarray] = [np.zeros((0, 3))]
     wide = np.flatnonzero(~narrow)
     most = max(LEAST_RAYS_OF_A_PART, RAYS // max(1, len(wide)))
-    for part in _chained(parts.middles(), wide):
+    for part in _chained(middles, wide):
         own = parts.owner == part
         directions, own_flux, power = parts.directions[own], parts.flux[own], parts.power[own]
         piece = median_cut(directions, power, most)

@@ -165,7 +165,7 @@ def test_few_and_many_lights_are_of_one_sky(gl_context, lights):
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_rays_and_narrow_lights_have_all_of_the_light(seed):
-    """Of any map, to the rounding of float32: what is not a narrow part's comes along rays."""
+    """Narrow lights and rays add up to the flux of the whole map, to the rounding of float32."""
     rng = np.random.default_rng(seed)
     radiance = rng.random((64, 128, 3)).astype(np.float32)
     radiance[16, 30] += 1e5 * (seed == 1)

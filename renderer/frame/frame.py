@@ -264,7 +264,9 @@ class Frame:
         resources["radiance"] = create_irradiance_target(context, size)
         resources["display"] = create_display_target(context, size)
         interleaved = setup.interleave > 1
-        resources["pixel_list"] = create_pixel_list(context, size if interleaved else (1, 1))
+        resources["pixel_list"] = create_pixel_list(
+            context, size if interleaved or setup.sky_count else (1, 1)
+        )
         if interleaved:
             resources["shared_direction"] = create_direction_target(context, size)
         resources["artist_parameters"] = context.buffer(reserve=BLOCK_BYTES)

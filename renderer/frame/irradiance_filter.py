@@ -34,6 +34,8 @@ class IrradianceFilter:
         relight: whether neighbours count as if they had a pixel's normal.
         refine: whether pixels with too few or too uneven neighbours go into `pixel_list`.
         add_base: whether `base` is added.
+        least_share: of a block's pixels: where a window has fewer on a pixel's surface, the pixel goes into
+            `pixel_list` too.
         largest_error: squared, relative to the mean's square, from which a pixel goes into that list.
     """
 
@@ -46,6 +48,7 @@ class IrradianceFilter:
         target: str,
         relight: bool = False,
         refine: bool = False,
+        least_share: float = 0.0,
         add_base: bool = False,
         largest_error: float = LARGEST_ERROR,
     ):
@@ -64,6 +67,7 @@ class IrradianceFilter:
                 "LARGEST_ERROR": largest_error,
                 "RELIGHT": relight,
                 "REFINE": refine,
+                "LEAST_SHARE": least_share,
                 "ADD_BASE": add_base,
             },
             reads=(*GBUFFER_READS, *reads),

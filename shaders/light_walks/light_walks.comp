@@ -46,6 +46,7 @@ uniform int glowing_steps;     // and one from a glowing surface
 uniform vec2 table_rotation;   // as in virtual_point_lights.comp
 
 const float PI = 3.14159265358979;
+const float GOLDEN_RATIO = 0.61803398874989;  // of all numbers, its multiples spread most evenly in [0, 1)
 // A choice: a ray starts so far above its surface, in diagonals of the scene. 7 digits of float32 leave 60 times less.
 const float WALK_LIFT = 1e-5;
 
@@ -110,13 +111,16 @@ VirtualPointLight next_reflection(VirtualPointLight place, vec2 numbers, uint se
 
 #if WALK_ENDS
 // One of all reflections from `first` on, drawn by its flux (Chao 1982), with the flux of all of them. From there on a
-// walk ends by Russian roulette, as its light may be caught in a corner that absorbs little.
-VirtualPointLight one_of_the_rest(VirtualPointLight first, int ray, uint seed) {
+// walk ends by Russian roulette, as its light may be caught in a corner that absorbs little. One number decides where it
+// ends: it goes on while the product of its chances is above `least`. These numbers are evenly spread over the walks, so
+// that nearly the right share of them goes on from each step.
+VirtualPointLight one_of_the_rest(VirtualPointLight first, int ray, float least, uint seed) {
     VirtualPointLight place = first;
     VirtualPointLight drawn = first;
     float total = mean_flux(first.flux.rgb);
+    float chance = 1.0;
     for (int i = 0; i < WALK_MOST_RAYS; ++i) {
-        vec2 chances = walk_numbers(seed, 2 * (ray + i) + 1);
+        float draw = walk_numbers(seed, 2 * (ray + i) + 1).x;
         VirtualPointLight next = next_reflection(place, walk_numbers(seed, 2 * (ray + i)), seed + uint(ray + i));
         float most = max(max(next.flux.r, next.flux.g), next.flux.b);
         float before = max(max(place.flux.r, place.flux.g), place.flux.b);
@@ -125,11 +129,12 @@ VirtualPointLight one_of_the_rest(VirtualPointLight first, int ray, uint seed) {
         }
         float flux = mean_flux(next.flux.rgb);
         total += flux;
-        if (chances.x * total < flux) {
+        if (draw * total < flux) {
             drawn = next;
         }
         float survival = min(most / before, WALK_SURVIVAL);
-        if (chances.y >= survival) {
+        chance *= survival;
+        if (chance <= least) {
             break;
         }
         place = next;
@@ -157,7 +162,7 @@ void main() {
         place = reflected;
 #if WALK_ENDS
         if (i == steps - 1 && mean_flux(reflected.flux.rgb) > 0.0) {
-            reflected = one_of_the_rest(reflected, steps, seed);
+            reflected = one_of_the_rest(reflected, steps, fract(float(walk) * GOLDEN_RATIO), seed);
         }
 #endif
         later_samples[walk * WALK_STEPS + i] = reflected;

@@ -9,6 +9,7 @@
 #include "common/scene_length.glsl"
 #include "common/virtual_point_lights.glsl"
 #include "common/mean_flux.glsl"
+#include "common/hash.glsl"
 
 layout(local_size_x = WALK_GROUP_SIZE) in;
 
@@ -29,17 +30,23 @@ const float PI = 3.14159265358979;
 shared vec4 sums_position[WALK_GROUP_SIZE];  // Σ flux · offset; Σ flux
 shared vec2 sums_rest[WALK_GROUP_SIZE];      // Σ flux · |offset|²; Σ flux of all first reflections
 
-// The sample that a disc starts at: the first reflection of a walk. In an open scene many walks leave at once, and a disc
-// that started at a dark sample would stay dark: it takes the next of the walks that are its own. So a walk that turns out
-// otherwise, by rounding, moves no other disc's start.
+// The sample that a disc starts at: one of all reflections of the walks that are its own, drawn by the square root of its
+// flux (Chao 1982). By flux alone there would be too few discs in dark rooms; evenly, too few where light is caught, as
+// between a lamp and the ceiling above it. A walk that turns out otherwise, by rounding, moves no other disc's start.
 VirtualPointLight start_of(int disc) {
+    VirtualPointLight drawn = NO_VPL;
+    float total = 0.0;
     for (int walk = disc % walk_count; walk < walk_count; walk += disc_count) {
-        VirtualPointLight one = later_samples[walk * WALK_STEPS];
-        if (one.normal_area.w > 0.0) {
-            return one;
+        for (int i = 0; i < WALK_STEPS; ++i) {
+            VirtualPointLight one = later_samples[walk * WALK_STEPS + i];
+            float weight = sqrt(one.flux.w);
+            total += weight;
+            if (unit_number(hashed(uint(walk * WALK_STEPS + i))) * total < weight) {
+                drawn = one;
+            }
         }
     }
-    return NO_VPL;
+    return drawn;
 }
 
 void main() {

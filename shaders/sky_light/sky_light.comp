@@ -1,13 +1,17 @@
-// Sky light: irradiance from the sky along rays, for the interleaved filter.
+// Sky light: irradiance from the sky along rays, for the interleaved filter, or in place of what the filter made.
 //
-// Reads: G-buffer, ray hierarchy, sky rays, open irradiance. Writes: irradiance [W/m²], alpha 1 where a surface is.
-// Constants: SKY_LIFT, OPEN_NODES. Python: renderer/frame/passes/sky_light.py.
+// Reads: G-buffer, ray hierarchy, sky rays, open irradiance; with LISTED_PIXELS, the pixel list and the irradiance that
+// this is added to. Writes: irradiance [W/m²], alpha 1 where a surface is.
+// Constants: SKY_LIFT, OPEN_NODES, BLOCK (pixels along its side), LISTED_PIXELS (only pixels of the list). Python: renderer/frame/passes/sky_light.py.
 //
-// The rays are shared out among the 8×8 pixels of a block: each pixel takes every 64th, or more where there are few. A window of the filter holds each
-// ray once, so that what it shows has shadows from all of them. What a pixel gets is a ratio: the share of its own rays'
-// light that arrives, of all that would arrive in the open. So open places have no noise, nor do borders of the image.
+// The rays are shared out among the pixels of a block. A window of the filter holds each ray once, so that what it shows
+// has shadows from all of them. What a pixel gets is a ratio: the share of its own rays' light that arrives, of all that
+// would arrive in the open. So open places have no noise, nor do borders of the image.
 #include "common/gbuffer.glsl"
 #include "common/ray_hierarchy.glsl"
+#if LISTED_PIXELS
+#include "common/pixel_list.glsl"
+#endif
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -28,7 +32,10 @@ layout(std430, binding = SKY_OPEN_BINDING) readonly buffer SkyOpen {
 
 uniform float longest;  // the scene's diagonal [world units]
 uniform int ray_count;
-uniform int stride;  // from one of a pixel's rays to its next: a power of two, at most the 64 pixels of a block
+uniform int stride;  // from one of a pixel's rays to its next: a power of two, at most BLOCK²
+#if LISTED_PIXELS
+uniform sampler2D base;  // added to the result
+#endif
 
 // Irradiance in the open on a surface with this normal.
 vec3 open_irradiance(vec3 normal) {
@@ -41,19 +48,24 @@ vec3 open_irradiance(vec3 normal) {
         mix(sky_open[at + OPEN_NODES].rgb, sky_open[at + OPEN_NODES + 1].rgb, blend.x), blend.y);
 }
 
-// A pixel's place in its block, in [0, 64): neighbours take other parts of the sky, and the next of them other rays of
-// the same parts, in the order of a Bayer matrix.
-int place_in_block(ivec2 pixel) {
-    ivec2 part = pixel & 1;
-    ivec2 ray = (pixel >> 1) & 3;
-    int across = ray.x ^ ray.y;
-    int order = (across & 1) << 3 | (ray.y & 1) << 2 | (across & 2) | ray.y >> 1;
-    return (part.x | part.y << 1) * 16 + order;
+// A pixel's first ray, below `stride`: its place in its block, in the order of a Bayer matrix. Neighbours are far apart in
+// that order, so they take rays of other parts of the sky.
+int first_ray(ivec2 pixel) {
+    int place = 0;
+    for (int bit = 0; (BLOCK >> bit) > 1; ++bit) {
+        int across = (pixel.x ^ pixel.y) >> bit & 1;
+        place = place << 2 | across << 1 | (pixel.y >> bit & 1);
+    }
+    return place * stride / (BLOCK * BLOCK);
 }
 
 void main() {
+#if LISTED_PIXELS
+    ivec2 pixel = listed_pixel(gl_WorkGroupID.xy, gl_LocalInvocationIndex);
+#else
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(pixel, imageSize(out_irradiance)))) {
+#endif
+    if (pixel.x < 0 || any(greaterThanEqual(pixel, imageSize(out_irradiance)))) {
         return;
     }
     Receiver receiver = gbuffer_receiver(pixel);
@@ -63,7 +75,7 @@ void main() {
         vec3 origin = receiver.position_world + receiver.normal_world * (SKY_LIFT * away);
         vec3 arriving = vec3(0.0);
         vec3 sent = vec3(0.0);
-        for (int i = place_in_block(pixel) % stride; i < ray_count; i += stride) {
+        for (int i = first_ray(pixel); i < ray_count; i += stride) {
             vec3 towards = sky_rays[i].towards.xyz;
             float cosine = dot(receiver.normal_world, towards);
             if (cosine <= 0.0) {
@@ -80,5 +92,8 @@ void main() {
         }
         irradiance = open_irradiance(receiver.normal_world) * arriving / max(sent, vec3(1e-30));
     }
+#if LISTED_PIXELS
+    irradiance += texelFetch(base, pixel, 0).rgb;
+#endif
     imageStore(out_irradiance, pixel, vec4(irradiance, receiver.valid ? 1.0 : 0.0));
 }

@@ -3,7 +3,7 @@
 //
 // Reads: G-buffer, the interleaved image; with RELIGHT, the direction of its light; with ADD_BASE, an image to add.
 // Writes: irradiance; with REFINE, the list of pixels that need a full gather.
-// Constants: INTERLEAVE, RELIGHT, REFINE, ADD_BASE; PLANE_TOLERANCE [pixel footprints], NORMAL_COSINE, LEAST_COSINE,
+// Constants: INTERLEAVE, RELIGHT, REFINE, LEAST_SHARE, ADD_BASE; PLANE_TOLERANCE [pixel footprints], NORMAL_COSINE, LEAST_COSINE,
 // LARGEST_RELIGHTING, LEAST_VARIANCE, LEAST_ABSENT and LARGEST_ERROR of renderer/frame/irradiance_filter.py.
 // Python: renderer/frame/irradiance_filter.py.
 // Source: Keller and Heidrich 2001 (the discontinuity buffer); Segovia et al. 2006.
@@ -13,7 +13,7 @@
 // pixel footprints so that no world unit enters. Weights are divided by their sum: a constant image stays constant.
 // With RELIGHT, a neighbour's irradiance is first converted to the pixel's normal, by the direction of its light.
 // Near an edge, some subsets are missing. With REFINE, pixels whose remaining subsets are too few or too uneven go into
-// the list for a full gather.
+// the list for a full gather; so do those of which fewer than LEAST_SHARE of the subsets remain.
 #include "common/gbuffer.glsl"
 #include "common/pixel_list.glsl"
 
@@ -115,7 +115,8 @@ void main() {
     }
     vec2 ndc_step = 2.0 / vec2(size);
     Window window = weigh(center, (vec2(pixel) + 0.5) * ndc_step - 1.0, ndc_step);
-    if (REFINE != 0 && needs_full_gather(window)) {
+    bool alone = window.sum.a < LEAST_SHARE * float(INTERLEAVE * INTERLEAVE);
+    if (alone || (REFINE != 0 && needs_full_gather(window))) {
         append_pixel(pixel);
     }
     vec3 irradiance = window.sum.rgb / window.sum.a;

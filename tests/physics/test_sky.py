@@ -99,7 +99,7 @@ def test_the_sky_is_seen_where_nothing_else_is(gl_context):
 def test_light_through_a_window_is_as_soft_as_the_sky_is_wide(gl_context):
     """On the floor of a room of 4 × 2 × 4 with one window: the irradiance of the window's rectangle.
 
-    The mean to 3 %; pointwise 0.25 RMS of the mean: a window of 8 pixels joins 1,024 rays, of which a place
+    The mean to 3 %; pointwise 0.15 RMS of the mean: a window of 2 pixels joins 1,024 rays, of which a place
     sees tens. With hard shadows from 32 directions there were 32 windows on the floor, and it was 1.5.
     """
     low, high, side = 0.8, 1.6, 0.5
@@ -123,11 +123,11 @@ def test_light_through_a_window_is_as_soft_as_the_sky_is_wide(gl_context):
     got = frame.direct_irradiance[floor][:, 0] / RADIANCE[0]
     assert floor.sum() > 2000
     assert got.mean() == pytest.approx(expected.mean(), rel=0.03)
-    assert np.sqrt(((got - expected) ** 2).mean()) < 0.25 * expected.mean()
+    assert np.sqrt(((got - expected) ** 2).mean()) < 0.15 * expected.mean()
 
 
 def test_under_a_table_it_is_dark_by_what_the_table_hides(gl_context):
-    """A square of side 2 at height 1 over open ground: π less its form factor. Pointwise 5 % of the mean."""
+    """A square of side 2 at height 1 over open ground: π less its form factor. Pointwise 1 % of the mean."""
     ground = quad((-10, 0, -10), (0, 0, 20), (20, 0, 0))
     scene = under_sky([ground, quad((-1, 1, -1), (2, 0, 0), (0, 0, 2))])
     view = replace(view_from((0.0, 0.5, 3.0), (0.0, 0.0, 0.0), 0.8), size=(96, 96))
@@ -137,7 +137,7 @@ def test_under_a_table_it_is_dark_by_what_the_table_hides(gl_context):
     hidden = polygon_irradiance(table, frame.position_world[floor], np.array([0.0, 1.0, 0.0]))
     got, expected = frame.direct_irradiance[floor][:, 0] / RADIANCE[0], np.pi - hidden
     assert got.mean() == pytest.approx(expected.mean(), rel=0.015)
-    assert np.sqrt(((got - expected) ** 2).mean()) < 0.05 * expected.mean()
+    assert np.sqrt(((got - expected) ** 2).mean()) < 0.01 * expected.mean()
 
 
 @pytest.mark.parametrize(("half_angle", "elevation"), [(0.03, 90), (0.08, 45), (0.12, 10), (0.3, 10)])

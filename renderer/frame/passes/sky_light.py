@@ -7,12 +7,17 @@ from vpltune.renderer.frame.irradiance_filter import IrradianceFilter
 from vpltune.renderer.gpu.gpu_program import ComputeProgram
 from vpltune.renderer.gpu.octahedral import octahedral_decode
 from vpltune.renderer.gpu.ray_hierarchy import RayHierarchy
-from vpltune.renderer.gpu.render_targets import GBUFFER_READS, pixel_groups
+from vpltune.renderer.gpu.render_targets import EMPTY_DISPATCH, GBUFFER_READS, pixel_groups
 from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.scene.sky_lights import SkyLights
 
-BLOCK = 8
-"""Pixels along the side of a block that shares the rays out. A choice: 1,024 rays are then 16 a pixel."""
+LARGEST_BLOCK = 8
+"""Pixels along the side of a block that shares the rays out, at most. A choice: 1,024 rays are then 16 a
+pixel."""
+MOST_RAYS = 1 << 22
+"""Rays of a frame whose blocks are smaller. A choice: about what a frame of 640×360 casts with the largest."""
+LEAST_SHARE = 0.125
+"""Of a block's pixels: where a window has fewer on a pixel's surface, the pixel takes as many rays itself."""
 LEAST_RAYS = 12
 """Rays of a pixel, at least: of fewer, all might lie below its horizon. A choice."""
 LIFT = 2e-5
@@ -24,8 +29,18 @@ OPEN_NODES = 33
 between them err by 0.1 %."""
 
 
+def block_side(pixels: int, rays: int) -> int:
+    """Pixels along the side of a block that shares `rays` out, in a frame of so many: 1, 2, 4 or 8."""
+    side = LARGEST_BLOCK
+    while side > 1 and pixels * rays <= MOST_RAYS * (side // 2) ** 2:
+        side //= 2
+    return side
+
+
 class SkyLightPass(FramePass):
     """G-buffer, ray hierarchy, `lamp_irradiance` → `target`, their sum; `shared_irradiance` in between.
+
+    Pixels whose neighbours are on other surfaces cast rays of their own.
 
     Rays, and not shadow maps: from 32 directions, light through a window fell on the floor as 32 windows, and
     its squared error was 15 times as large (`tests/physics/test_sky.py`).
@@ -34,9 +49,12 @@ class SkyLightPass(FramePass):
     name = "sky_light"
 
     def __init__(self, resources: Resources, hierarchy: RayHierarchy, sky: SkyLights, target: str):
+        self._resources = resources
         self._hierarchy = hierarchy
         self._count = len(sky.ray_flux)
-        self._stride = BLOCK**2
+        image = resources.texture(target)
+        self._block = block_side(image.width * image.height, self._count)
+        self._stride = self._block**2
         while self._stride > 1 and self._count < LEAST_RAYS * self._stride:
             self._stride //= 2
         rays = np.zeros((self._count, 2, 4), np.float32)
@@ -48,27 +66,39 @@ class SkyLightPass(FramePass):
             octahedral_decode(nodes.astype(np.float32)).astype(np.float64)
         )
         resources["sky_open"] = resources.context.buffer(in_the_open.tobytes())
-        self._groups = pixel_groups(resources.texture(target))
+        self._groups = pixel_groups(image)
+        defines = {**hierarchy.defines, "SKY_LIFT": LIFT, "OPEN_NODES": OPEN_NODES, "BLOCK": self._block}
+        reads = (*GBUFFER_READS, *hierarchy.reads, "sky_rays", "sky_open")
         self._program = ComputeProgram(
             resources,
             "sky_light/sky_light",
-            {**hierarchy.defines, "SKY_LIFT": LIFT, "OPEN_NODES": OPEN_NODES},
-            reads=(*GBUFFER_READS, *hierarchy.reads, "sky_rays", "sky_open"),
+            {**defines, "LISTED_PIXELS": False},
+            reads=reads,
             writes=("shared_irradiance as irradiance",),
         )
         self._filter = IrradianceFilter(
             resources,
-            BLOCK,
+            self._block,
             reads=("shared_irradiance as interleaved", "lamp_irradiance as base"),
             target=target,
+            least_share=LEAST_SHARE if self._stride > 1 else 0.0,
             add_base=True,
+        )
+        self._listed = ComputeProgram(
+            resources,
+            "sky_light/sky_light",
+            {**defines, "LISTED_PIXELS": True},
+            reads=(*reads, "pixel_list", "lamp_irradiance as base"),
+            writes=(f"{target} as irradiance",),
         )
 
     def draw(self, inputs: FrameInputs) -> None:
         """Cast the rays, and join the pixels' shares."""
         self._hierarchy.update()
-        camera = inputs.camera.uniforms
-        self._program.dispatch(
-            *self._groups, **camera, longest=inputs.scene_diagonal, ray_count=self._count, stride=self._stride
-        )
+        uniforms = {**inputs.camera.uniforms, "longest": inputs.scene_diagonal, "ray_count": self._count}
+        self._program.dispatch(*self._groups, **uniforms, stride=self._stride)
+        self._resources.write("pixel_list", EMPTY_DISPATCH)
         self._filter.draw(inputs)
+        if self._stride > 1:
+            stride = round(1.0 / LEAST_SHARE)
+            self._listed.dispatch_indirect("pixel_list", **uniforms, stride=stride)

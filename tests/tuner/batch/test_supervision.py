@@ -9,13 +9,17 @@ import subprocess
 import sys
 import threading
 import time
+from multiprocessing import Pipe
 from pathlib import Path
+from types import SimpleNamespace
 
 import psutil
 import pytest
 
 from vpltune.cli.program import run
 from vpltune.renderer.errors import MachineError
+from vpltune.renderer.gpu import gpu_context
+from vpltune.tuner.batch import tuning_process
 from vpltune.tuner.batch.attempts import tune_with_retries
 from vpltune.tuner.batch.local_scheduler import tune_locally
 from vpltune.tuner.batch.supervised_process import Limits, StoppedError, SupervisedProcess, memory_of
@@ -106,6 +110,41 @@ def test_a_second_attempt_may_succeed(supervised, make_job):
 def test_a_machine_that_lacks_something_is_no_scenes_fault(supervised, make_job):
     with pytest.raises(MachineError, match="no OpenGL"):
         tune_with_retries(supervised, make_job("no machine"), PLENTY, lambda event: None)
+
+
+@pytest.fixture
+def outcome_of(make_job, fits):
+    """What the tuning process answers where a fit raises `error`."""
+
+    def outcome(error: str) -> dict:
+        fits.error = MachineError(error)
+        ours, theirs = Pipe()
+        with ours, theirs:
+            return tuning_process._outcome(theirs, make_job(), 1)
+
+    return outcome
+
+
+def test_a_scene_too_large_for_this_gpu_fails_alone(outcome_of, monkeypatch):
+    made = []
+    monkeypatch.setattr(
+        gpu_context, "create_context", lambda: made.append(1) or SimpleNamespace(release=list)
+    )
+    assert outcome_of("a 16384x16384 depth texture: out of memory") == {
+        "failed": "a 16384x16384 depth texture: out of memory"
+    }
+    assert made  # it is the context that says that other scenes can be fitted
+
+
+def test_what_ends_every_fit_ends_the_batch(outcome_of, monkeypatch, make_job):
+    full = f"{make_job().folder}/scenes/a/tuned.json: cannot be written (No space left on device)"
+    assert outcome_of(full) == {"machine_error": full}
+
+    def no_context():
+        raise MachineError("no OpenGL")
+
+    monkeypatch.setattr(gpu_context, "create_context", no_context)
+    assert outcome_of("GL_OUT_OF_MEMORY") == {"machine_error": "GL_OUT_OF_MEMORY"}
 
 
 def test_stopping_ends_the_process(supervised, make_job):

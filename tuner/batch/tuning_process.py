@@ -47,7 +47,8 @@ def _outcome(connection: Connection, job: Job, attempt: int) -> dict[str, Any]:
     except MachineError as error:
         if _ends_every_fit(job, error):
             return {"machine_error": str(error)}
-        return {"failed": str(error)}
+        # What the driver still holds must not count against the next scene.
+        return {"failed": str(error), "renew": True}
     # A bug, a full disk, or no memory left: this attempt failed, but other scenes may succeed.
     except Exception as error:
         traceback.print_exc()

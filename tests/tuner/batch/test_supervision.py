@@ -50,6 +50,8 @@ while True:
         os._exit(7)
     elif does == "no machine":
         send(connection, {"machine_error": "no OpenGL"})
+    elif does == "too large":
+        send(connection, {"failed": "the GPU ran out of memory", "renew": True})
     elif does == "second time" and order["attempt"] == 1:
         send(connection, {"failed": "ValueError: once"})
     else:
@@ -127,13 +129,11 @@ def outcome_of(make_job, fits):
 
 def test_a_scene_too_large_for_this_gpu_fails_alone(outcome_of, monkeypatch):
     made = []
-    monkeypatch.setattr(
-        gpu_context, "create_context", lambda: made.append(1) or SimpleNamespace(release=list)
-    )
-    assert outcome_of("a 16384x16384 depth texture: out of memory") == {
-        "failed": "a 16384x16384 depth texture: out of memory"
-    }
-    assert made  # it is the context that says that other scenes can be fitted
+    context = SimpleNamespace(release=lambda: made.append("released"))
+    monkeypatch.setattr(gpu_context, "create_context", lambda: context)
+    failed = outcome_of("the depth texture: out of memory")
+    assert failed == {"failed": "the depth texture: out of memory", "renew": True}
+    assert made == ["released"]  # that a context can be made says that other scenes can be fitted
 
 
 def test_what_ends_every_fit_ends_the_batch(outcome_of, monkeypatch, make_job):
@@ -145,6 +145,15 @@ def test_what_ends_every_fit_ends_the_batch(outcome_of, monkeypatch, make_job):
 
     monkeypatch.setattr(gpu_context, "create_context", no_context)
     assert outcome_of("GL_OUT_OF_MEMORY") == {"machine_error": "GL_OUT_OF_MEMORY"}
+
+
+def test_the_scene_after_one_too_large_has_a_process_of_its_own(supervised, make_job):
+    supervised.attempt(make_job("next"), 1, PLENTY, lambda stage, share: None)
+    first = supervised._process.pid
+    failed = supervised.attempt(make_job("too large"), 1, PLENTY, lambda stage, share: None)
+    assert (failed.record, failed.failure) == (None, "the GPU ran out of memory")
+    supervised.attempt(make_job("next"), 1, PLENTY, lambda stage, share: None)
+    assert supervised._process.pid != first
 
 
 def test_stopping_ends_the_process(supervised, make_job):

@@ -14,7 +14,7 @@ from urllib.parse import quote, unquote
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.files.atomic_file import written_whole
 from vpltune.renderer.files.glb_container import GLB_MAGIC, JSON_CHUNK
-from vpltune.renderer.files.strict_json import no_constant
+from vpltune.renderer.files.strict_json import NotFiniteError, finite_float, no_constant, not_finite_at
 
 EXTRAS_KEY = "vpltune"
 GLTF_SUFFIXES = (".gltf", ".glb")
@@ -81,7 +81,9 @@ def _opened(path: Path) -> tuple[dict[str, Any], bytes | None]:
             raise InputError(f"{path}: GLB: the first chunk must be JSON, and whole")
         content, rest = content[20 : 20 + length], content[20 + length :]
     try:
-        root = json.loads(content, parse_constant=no_constant)
+        root = json.loads(content, parse_constant=no_constant, parse_float=finite_float)
+    except NotFiniteError as error:
+        raise InputError(f"{path}: {not_finite_at(content)}: {error}") from error
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: not JSON ({error})") from error
     _check_lists(root, path)

@@ -58,10 +58,10 @@ def write_text_whole(path: Path, text: str) -> None:
 
 @contextlib.contextmanager
 def written_together(folder: Path) -> Iterator[Path]:
-    """Yield an empty folder in `folder`; on success, move all files in it to `folder`.
+    """Yield an empty folder in `folder`; on success, move all files in and below it to `folder`.
 
     So a set of files changes whole: what can fail, fails before the first one is replaced. Other files in
-    `folder` stay.
+    `folder` and below stay.
 
     Raises:
         InputError, MachineError: as `written_whole`.
@@ -71,10 +71,14 @@ def written_together(folder: Path) -> Iterator[Path]:
     staging = unfinished_files.new_folder(folder)
     try:
         yield staging
-        ready = {path: folder / path.name for path in sorted(staging.iterdir())}
+        files = sorted(path for path in staging.rglob("*") if path.is_file())
+        ready = {path: folder / path.relative_to(staging) for path in files}
         for named in ready.values():
             if named.is_dir():
                 raise InputError(f"{named}: cannot be written (it is a folder)")
+        for below in {named.parent for named in ready.values()} - {folder}:
+            require_writable(below)
+            below.mkdir(parents=True, exist_ok=True)
         for path, named in ready.items():
             path.replace(named)
     except (InputError, MachineError) as error:

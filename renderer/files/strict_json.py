@@ -5,6 +5,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+# A choice: most characters of a place in a message, which is one line. Its end says more than its start.
+_LONGEST_PLACE = 200
+
 
 def strict_json(document: Mapping[str, Any], indent: int | None = 2) -> str:
     """`document` as JSON text. Numbers that are not finite become null, since JSON has none.
@@ -34,13 +37,63 @@ def unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return members
 
 
+class NotFiniteError(ValueError):
+    """A number is NaN or infinite. The message is the number and the rule."""
+
+
 def no_constant(name: str) -> float:
     """A `parse_constant` for `json.loads` that refuses NaN and Infinity, which Python reads by default.
 
     Raises:
-        ValueError: always.
+        NotFiniteError: always.
     """
-    raise ValueError(f"{name} is not a JSON number")
+    raise NotFiniteError(f"{name} is not a JSON number")
+
+
+def finite_float(text: str) -> float:
+    """A `parse_float` for `json.loads` that refuses what Python reads as infinite, such as 1e999.
+
+    Raises:
+        NotFiniteError: it is too large.
+    """
+    value = float(text)
+    if not math.isfinite(value):
+        raise NotFiniteError(f"number {text:.40} is too large")
+    return value
+
+
+def not_finite_at(text: str | bytes) -> str:
+    """The place of the first number that is not finite, such as `nodes[3].translation[0]`.
+
+    Returns "the document" where the rest of the text is no JSON either.
+    """
+    try:
+        document = json.loads(text)
+    except (ValueError, RecursionError):
+        return "the document"
+    waiting: list[tuple[str, Any]] = [("", document)]
+    while waiting:
+        place, value = waiting.pop()
+        if isinstance(value, float) and not math.isfinite(value):
+            return place[-_LONGEST_PLACE:] or "the document"
+        if isinstance(value, dict):
+            waiting += [(_member(place, key), item) for key, item in reversed(value.items()) if _holds(item)]
+        elif isinstance(value, list):
+            last = len(value) - 1
+            waiting += [
+                (f"{place}[{last - i}]", item) for i, item in enumerate(reversed(value)) if _holds(item)
+            ]
+    return "the document"
+
+
+def _member(place: str, key: str) -> str:
+    if not key.isidentifier():
+        return f"{place}[{key!r:.60}]"
+    return f"{place}.{key:.60}" if place else f"{key:.60}"
+
+
+def _holds(value: Any) -> bool:
+    return isinstance(value, float | dict | list)
 
 
 def _finite(value: Any) -> Any:

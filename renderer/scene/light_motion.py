@@ -11,8 +11,9 @@ import numpy as np
 from jaxtyping import Float64, Int64
 
 from vpltune.renderer.scene.dynamic_lights import point_lights, spot_lights
+from vpltune.renderer.scene.light_range import range_falloff
 from vpltune.renderer.scene.placement.free_space import FreeSpace, free_space
-from vpltune.renderer.scene.placement.sight import light_hits, mean_square_distance_world
+from vpltune.renderer.scene.placement.sight import light_hits
 from vpltune.renderer.scene.scene import Light, Scene
 
 SPEED = 0.15
@@ -188,9 +189,17 @@ def flux_beside(scene: Scene, lights: tuple[Light, ...]) -> float:
 
 
 def _irradiance_met(space: FreeSpace, light: Light) -> float:
-    """Irradiance in W/m² at the RMS distance of the surfaces a light reaches; 0 if it reaches none."""
+    """Irradiance in W/m² at the RMS distance of the surfaces a light reaches; 0 if it reaches none.
+
+    The light does not reach what lies beyond its range, and falls off towards it.
+    """
     level = float(light.intensity.mean())
     if light.kind == "directional":
         return level
-    square = mean_square_distance_world(space, light_hits(space, light))
-    return level / square if square > 0.0 else 0.0
+    hits = light_hits(space, light)
+    distance_world = hits.distance[hits.hit] * space.voxel_world
+    reached = distance_world[distance_world < light.range]
+    if not reached.size:
+        return 0.0
+    square = float((reached**2).mean())
+    return level / square * float(range_falloff(light, np.array([math.sqrt(square)]))[0])

@@ -270,7 +270,33 @@ class Scene:
 def _placed_bounds(
     points: Float32[np.ndarray, "n 3"], matrices: Float64[np.ndarray, "k 4 4"]
 ) -> tuple[Float64[np.ndarray, "3"], Float64[np.ndarray, "3"]]:
-    """The low and the high corner of all points under each matrix. It takes 4 ns for each."""
+    """The low and the high corner of all points under each matrix.
+
+    An instance whose box lies inside what others reach changes nothing, and its points are not placed.
+    """
+    if len(matrices) == 1 or not len(points):
+        return _points_bounds(points, matrices)
+    # The points' box under each matrix: an outer bound for both corners.
+    least, most = points.min(axis=0).astype(np.float64), points.max(axis=0).astype(np.float64)
+    middle = matrices[:, :3, :3] @ (0.5 * (least + most)) + matrices[:, :3, 3]
+    reach = np.abs(matrices[:, :3, :3]) @ (0.5 * (most - least))
+    outer = np.concatenate([reach - middle, reach + middle], axis=1)
+    first = np.unique(outer.argmax(axis=0))
+    low, high = _points_bounds(points, matrices[first])
+    # Far above rounding, so that the result is that of all points, to the last bit.
+    slack = 1e-12 * np.abs(outer).max()
+    rest = (outer >= np.concatenate([-low, high]) - slack).any(axis=1)
+    rest[first] = False
+    if rest.any():
+        others = _points_bounds(points, matrices[rest])
+        low, high = np.minimum(low, others[0]), np.maximum(high, others[1])
+    return low, high
+
+
+def _points_bounds(
+    points: Float32[np.ndarray, "n 3"], matrices: Float64[np.ndarray, "k 4 4"]
+) -> tuple[Float64[np.ndarray, "3"], Float64[np.ndarray, "3"]]:
+    """As `_placed_bounds`, from every point under every matrix. It takes 4 ns for each."""
     low, high = np.full((len(matrices), 3), np.inf), np.full((len(matrices), 3), -np.inf)
     for first in range(0, len(points), _BOUND_CHUNK):
         chunk = np.ascontiguousarray(points[first : first + _BOUND_CHUNK].astype(np.float64).T)

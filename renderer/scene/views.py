@@ -254,7 +254,8 @@ def _numbers(
     entry: Any, key: str, count: int, where: str, most: float = LARGEST_NUMBER
 ) -> Float64[np.ndarray, " count"]:
     value = _member(entry, key, where)
-    items = value if isinstance(value, list) else [value]
+    # One number is no list.
+    items = [value] if count == 1 else value if isinstance(value, list) else []
     # Python's json reads 1e999 as infinity and NaN as NaN, and bool is a subclass of int.
     plain = all(isinstance(item, int | float) and not isinstance(item, bool) for item in items)
     if not plain or len(items) != count or not all(abs(item) <= most for item in items):

@@ -53,6 +53,13 @@ def test_a_cone_of_equal_angles_is_a_hard_edge():
     assert 0.0 < light.outer_cone - light.inner_cone < 0.002 * light.outer_cone
 
 
+@pytest.mark.parametrize("light", [POINT, SPOT | {"light_direction": "0,-1,0"}])
+def test_a_light_ends_at_its_range(light):
+    assert light_from_flags(ViewFlags(**light)).range == math.inf
+    assert light_from_flags(ViewFlags(**light, light_range=2.5)).range == 2.5
+    assert light_from_flags(ViewFlags(**light, light_range=1e300)).range == math.inf
+
+
 def test_one_intensity_is_white_and_three_are_a_colour():
     np.testing.assert_array_equal(light_from_flags(ViewFlags(**POINT)).intensity, [1.0, 1.0, 1.0])
     one = light_from_flags(ViewFlags(**POINT, light_intensity="7"))
@@ -116,6 +123,10 @@ REFUSED_LIGHTS = {
         "--light-cone: must be 2 finite",
     ),
     "sun with cone": (SUN | {"light_cone": "1,2"}, "--light-cone: a directional light has none"),
+    "sun with range": (SUN | {"light_range": 3.0}, "--light-range: a directional light has none"),
+    "range alone": ({"light_range": 3.0}, "--light-type: must be given with --light-range"),
+    "range of 0": (POINT | {"light_range": 0.0}, "--light-range: must be positive, at least 1e-30, got 0"),
+    "range of NaN": (POINT | {"light_range": math.nan}, "--light-range: must be positive"),
     "sun with place": (SUN | {"light_position": "1,2,3"}, "takes it only with --light-look-at"),
     "sun without aim": ({"light_type": "directional"}, "a directional light needs either this or"),
     "dark": (POINT | {"light_intensity": "0"}, "--light-intensity: must not be negative or all zero, got 0"),

@@ -22,6 +22,8 @@ from vpltune.renderer.scene.files.mtl_materials import MOST_LIBRARIES, map_state
 from vpltune.renderer.scene.files.obj_scene import library_names
 from vpltune.renderer.scene.files.ply_data import LONGEST_HEADER, parse_ply_header
 from vpltune.renderer.scene.files.text_lines import first_word, text_lines
+from vpltune.renderer.scene.mitsuba_import.plugin_tree import plugin_tree
+from vpltune.renderer.scene.mitsuba_import.searched_folder import MOST_PATHS
 from vpltune.renderer.scene.mitsuba_import.xml_tree import XmlNode, parse_xml
 from vpltune.renderer.scene.placement.scene_sidecar import sidecar_of
 
@@ -30,8 +32,10 @@ MITSUBA_SUFFIX = ".xml"
 
 # Magic, version, file length, length and type of the JSON chunk (glTF 2.0, section 4.4).
 _GLB_HEADER = struct.Struct("<4sIIII")
-# An attribute of Mitsuba's XML that names a file.
+# A string of Mitsuba's XML that names a file.
 _FILE_NAME = re.compile(r".+\.[A-Za-z0-9]{2,4}")
+# A choice: most names of a Mitsuba scene, each looked for in all its folders. A reader refuses 10,001 shapes.
+_MOST_NAMES = 20_000
 
 
 def referred_files(scene: Path) -> tuple[Path, ...]:
@@ -67,7 +71,7 @@ def _names(scene: Path) -> Iterator[str]:
         elif suffix == ".ply":
             yield parse_ply_header(_content(scene, LONGEST_HEADER)).texture_name
         elif suffix == MITSUBA_SUFFIX:
-            yield from _mitsuba_names(parse_xml(_content(scene)))
+            yield from _mitsuba_names(scene, parse_xml(_content(scene)))
 
 
 def _gltf_json(scene: Path) -> bytes:
@@ -124,15 +128,35 @@ def _library_names(content: bytes) -> Iterator[str]:
                 yield name
 
 
-def _mitsuba_names(root: XmlNode) -> Iterator[str]:
-    """Values that end like a file's name."""
+def _mitsuba_names(scene: Path, root: XmlNode) -> Iterator[str]:
+    """Strings that end like a file's name, in the folders of the scene's <path> elements and in its own.
+
+    The reader takes the file of the last of these folders that has it. One that is absent counts too: once it
+    is there, it is taken.
+    """
+    with contextlib.suppress(SceneFileError):
+        plugin_tree(root)  # puts defaults in the place of $names
+    paths = [node.attributes.get("value", "") for node in root.children if node.tag == "path"]
+    folders = [path for path in paths[:MOST_PATHS] if _is_folder(scene, path)]
+    names = (node.attributes.get("value", "") for node in _strings(root))
+    found = dict.fromkeys(name for name in names if _FILE_NAME.fullmatch(name))
+    for name in islice(found, _MOST_NAMES):
+        yield from (f"{folder}/{name}" for folder in reversed(folders))
+        yield name
+
+
+def _strings(root: XmlNode) -> Iterator[XmlNode]:
     nodes = [root]
     while nodes:
         node = nodes.pop()
         nodes += reversed(node.children)
-        name = node.attributes.get("value", "")
-        if _FILE_NAME.fullmatch(name):
-            yield name
+        if node.tag == "string":
+            yield node
+
+
+def _is_folder(scene: Path, name: str) -> bool:
+    folder = _inside(scene.parent, name)
+    return folder is not None and folder.is_dir()
 
 
 def _inside(folder: Path, name: str) -> Path | None:

@@ -120,6 +120,8 @@ class SupervisedProcess:
         seconds = time.perf_counter() - started
         if "machine_error" in answer:
             raise MachineError(answer["machine_error"])
+        if answer.get("renew"):
+            self.close()
         record = Record(**answer["record"]) if "record" in answer else None
         return Attempt(record, answer.get("failed", ""), seconds)
 

@@ -45,12 +45,30 @@ def _outcome(connection: Connection, job: Job, attempt: int) -> dict[str, Any]:
     try:
         record = tune_one(job, attempt, progress)
     except MachineError as error:
-        return {"machine_error": str(error)}
+        if _ends_every_fit(job, error):
+            return {"machine_error": str(error)}
+        # What the driver still holds must not count against the next scene.
+        return {"failed": str(error), "renew": True}
     # A bug, a full disk, or no memory left: this attempt failed, but other scenes may succeed.
     except Exception as error:
         traceback.print_exc()
         return {"failed": f"{type(error).__name__}: {error}"}
     return {"busy": True} if record is None else {"record": as_document(record)}
+
+
+def _ends_every_fit(job: Job, error: MachineError) -> bool:
+    """Whether `error` ends every fit on this machine. A scene too large for the GPU ends its own alone."""
+    if str(error).startswith(job.folder):
+        return True  # the batch folder cannot be written to
+    from vpltune.renderer.gpu.gpu_context import create_context
+    from vpltune.tuner.doctor.jax_platform import require_jax_platform
+
+    try:
+        create_context().release()
+        require_jax_platform()
+    except MachineError:
+        return True
+    return False
 
 
 def _die_with_parent() -> None:

@@ -1,4 +1,4 @@
-"""Fits a scene to a frame-time budget, or fits and writes a Pareto front of error against frame time."""
+"""Fits a scene to a frame-time budget, or fits a Pareto front of error against frame time."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -11,7 +11,7 @@ from vpltune.renderer.files.atomic_file import write_text_whole, written_whole
 from vpltune.tuner.evaluation.prepare_scene import PreparedScene
 from vpltune.tuner.fitting.fit_status import Descent
 from vpltune.tuner.frame_time.frame_budget import CHOICES, BudgetFit, FrameBudget
-from vpltune.tuner.frame_time.pareto_front import fit_front
+from vpltune.tuner.frame_time.pareto_front import fit_front, forget_front
 
 _COLUMNS = ("milliseconds", "relmse", "vpl_count")
 
@@ -42,33 +42,32 @@ def fit_to_budget(
     prepared: PreparedScene,
     start: TunedConfig,
     options: BudgetOptions,
-    output: Path | None,
     *,
     seed: int = 0,
     progress: Callable[[float], None] = lambda share: None,
-) -> tuple[TunedConfig, Descent, dict[str, Any]]:
+) -> tuple[TunedConfig, Descent, dict[str, Any], "Front | None"]:
     """Fit a scene to a frame-time budget.
 
     Args:
         prepared: the scene; at least one of its fitted views is lit.
         start: where the fit begins; has no prior.
         options: budget, front and frame size.
-        output: folder that a front's configs, table and plot are written to; may be None without a front.
         seed: selects pixels and rotations.
         progress: called with the share done, in [0, 1].
 
     Returns:
         The config that meets the budget, or without one the point of the front with the least error; its
-        descent; and the keys `budget` and `pareto` of metrics.json.
+        descent; the keys `budget` and `pareto` of metrics.json; and the front, if there is one.
 
     Raises:
-        InputError: no frame is as fast as the budget, or `output` cannot be written to.
+        InputError: no frame is as fast as the budget.
         MachineError: the GPU ran out of memory or reported an error.
     """
     size = options.frame_size or prepared.views[0].view.size
     budget = FrameBudget(prepared, start, size, seed=seed, progress=lambda share: progress(0.1 * share))
     found: dict[str, Any] = {}
     best: BudgetFit | None = None
+    front: Front | None = None
     begin = 0.1
     if options.milliseconds is not None:
         end = 0.3 if options.pareto else 1.0
@@ -76,40 +75,62 @@ def fit_to_budget(
         found["budget"] = {"frame_size": list(size), **best.document()}
         begin = end
     if options.pareto:
-        assert output is not None, "a front is written to a folder"
         points = fit_front(budget, lambda share: progress(begin + (1.0 - begin) * share))
-        found["pareto"] = write_front(output, points, start, size)
+        front = Front(points, start, size, budget.content_key())
+        found["pareto"] = front.rows()
         best = best or points[-1]
     assert best is not None, "options ask for neither"
-    return best.config(start), best.descent, found
+    return best.config(start), best.descent, found, front
 
 
-def write_front(
-    output: Path, points: Sequence[BudgetFit], start: TunedConfig, frame_size: tuple[int, int]
-) -> list[dict[str, Any]]:
-    """Write pareto/<n>.json, pareto.csv and pareto.png to `output`; return the key `pareto` of metrics.json.
+@dataclass(frozen=True, eq=False)
+class Front:
+    """A Pareto front, and how its files are written."""
 
-    Configs of an earlier front, which may have more points, are removed.
+    points: Sequence[BudgetFit]
+    """By rising frame time."""
+    start: TunedConfig
+    """Where the fits began."""
+    frame_size: tuple[int, int]
+    """Width and height of the timed frames, in pixels."""
+    content_key: str
+    """The budget's key (`FrameBudget.content_key`); its fits are in the cache until the files are written."""
 
-    Raises:
-        InputError: `output` cannot be written to.
-    """
-    for earlier in output.glob("pareto/[0-9]*.json"):
-        earlier.unlink()
-    rows = []
-    for index, point in enumerate(points):
-        name = f"pareto/{index}.json"
-        provenance = {"milliseconds": point.frame.milliseconds}
-        write_config(output / name, replace(point.config(start), provenance=provenance, fit=None))
-        document = {"frame_size": list(frame_size), **point.document()}
-        rows.append({**document, "parameters": point.parameters.as_dict(), "config": name})
-    lines = [",".join((*_COLUMNS, *CHOICES, "config"))]
-    for row in rows:
-        cells = [f"{row[name]:.6g}" for name in _COLUMNS] + [str(row["choice"][name]) for name in CHOICES]
-        lines.append(",".join((*cells, row["config"])))
-    write_text_whole(output / "pareto.csv", "\n".join(lines) + "\n")
-    write_plot(output / "pareto.png", points)
-    return rows
+    def rows(self) -> list[dict[str, Any]]:
+        """The key `pareto` of metrics.json."""
+        return [
+            {
+                "frame_size": list(self.frame_size),
+                **point.document(),
+                "parameters": point.parameters.as_dict(),
+                "config": f"pareto/{index}.json",
+            }
+            for index, point in enumerate(self.points)
+        ]
+
+    def write(self, folder: Path) -> None:
+        """Write pareto/<n>.json, pareto.csv and pareto.png to `folder`.
+
+        Raises:
+            InputError, MachineError: `folder` cannot be written to.
+        """
+        lines = [",".join((*_COLUMNS, *CHOICES, "config"))]
+        for point, row in zip(self.points, self.rows(), strict=True):
+            provenance = {"milliseconds": point.frame.milliseconds}
+            config = replace(point.config(self.start), provenance=provenance, fit=None)
+            write_config(folder / row["config"], config)
+            cells = [f"{row[name]:.6g}" for name in _COLUMNS] + [str(row["choice"][name]) for name in CHOICES]
+            lines.append(",".join((*cells, row["config"])))
+        write_text_whole(folder / "pareto.csv", "\n".join(lines) + "\n")
+        write_plot(folder / "pareto.png", self.points)
+
+    def end(self, folder: Path) -> None:
+        """Call it once the files are in `folder`. The configs of an earlier front with more points go, and
+        the saved fits."""
+        for earlier in folder.glob("pareto/[0-9]*.json"):
+            if earlier.stem.isdecimal() and int(earlier.stem) >= len(self.points):
+                earlier.unlink()
+        forget_front(self.content_key)
 
 
 def write_plot(path: Path, points: Sequence[BudgetFit]) -> None:

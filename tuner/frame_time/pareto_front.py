@@ -1,7 +1,8 @@
 """The Pareto front of error against frame time: fits over the range of useful budgets.
 
 A point takes a whole fit, so each is saved in the user's cache as soon as it is done, and an interrupted
-front resumes with its budgets. A finished front is removed from the cache, so the next run measures it again.
+front resumes with its budgets. Once its files are written, a front is removed from the cache, so the next run
+measures it again.
 """
 
 import json
@@ -32,7 +33,7 @@ then affects all points alike."""
 
 
 def fit_front(budget: FrameBudget, progress: Progress | None = None) -> tuple[BudgetFit, ...]:
-    """Fit all budgets, and return the Pareto front by rising frame time.
+    """Fit all budgets, and return the Pareto front by rising frame time. Its fits stay in the cache.
 
     Raises:
         InputError: no budget could be met.
@@ -57,9 +58,12 @@ def fit_front(budget: FrameBudget, progress: Progress | None = None) -> tuple[Bu
                 raise
             kept.add(())
         points += kept.fits[index]
-    timed = _timed_in_turns(budget, points)
-    kept.forget()
-    return pareto_front(timed)
+    return pareto_front(_timed_in_turns(budget, points))
+
+
+def forget_front(content_key: str) -> None:
+    """Remove the saved fits of the front of a `FrameBudget` with this key."""
+    _kept_path(content_key).unlink(missing_ok=True)
 
 
 def pareto_front(points: Sequence[BudgetFit]) -> tuple[BudgetFit, ...]:
@@ -89,11 +93,15 @@ def _budgets(budget: FrameBudget) -> list[float]:
     return [float(each) for each in np.geomspace(least, most, POINTS)]
 
 
+def _kept_path(content_key: str) -> Path:
+    return cache_folder() / "fronts" / f"{content_key}.json"
+
+
 class _KeptFits:
     """The saved state of a front: its budgets, and for each finished one a fit, or none if it was not met."""
 
     def __init__(self, budget: FrameBudget):
-        self._path: Path = cache_folder() / "fronts" / f"{budget.content_key()}.json"
+        self._path = _kept_path(budget.content_key())
         self.fits: list[tuple[BudgetFit, ...]]
         try:
             document = json.loads(self._path.read_text(encoding="utf-8"))
@@ -114,10 +122,6 @@ class _KeptFits:
             write_text_whole(self._path, json.dumps(document) + "\n")
         except (InputError, MachineError):
             return  # the cache cannot be written to: an interrupted front starts over
-
-    def forget(self) -> None:
-        """Remove the saved state."""
-        self._path.unlink(missing_ok=True)
 
 
 def _fit_document(fit: BudgetFit) -> dict[str, Any]:

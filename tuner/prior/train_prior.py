@@ -15,7 +15,7 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.auto_prior import AutoPrior
 from vpltune.renderer.config.tuned_config import TunedConfig, write_config
 from vpltune.renderer.errors import InputError
-from vpltune.renderer.files.atomic_file import write_text_whole
+from vpltune.renderer.files.atomic_file import write_text_whole, written_together
 from vpltune.renderer.gpu.gpu_context import create_context
 from vpltune.renderer.scene.files import read_scene
 from vpltune.renderer.scene.placement import resolve_camera_and_lights, with_environment
@@ -93,8 +93,7 @@ def train_prior(
         **({} if command is None else {"command": command}),
     }
     config = TunedConfig(ArtistParameters(), provenance, "maps", learnt.prior)
-    write_text_whole(output.with_suffix(".md"), prior_card(learnt, config, left_out))
-    write_config(output, config)
+    write_prior(output, config, prior_card(learnt, config, left_out))
     return {
         "output": str(output),
         "card": str(output.with_suffix(".md")),
@@ -102,6 +101,17 @@ def train_prior(
         "left_out": left_out,
         "status": "ok",
     }
+
+
+def write_prior(output: Path, config: TunedConfig, card: str) -> None:
+    """Write the config, and its card beside it; both or neither.
+
+    Raises:
+        InputError, MachineError: they cannot be written.
+    """
+    with written_together(output.parent) as folder:
+        write_text_whole(folder / output.with_suffix(".md").name, card)
+        write_config(folder / output.name, config)
 
 
 def scene_sources(library: Path | None, generated: int, seed: int) -> dict[str, Callable[[], Scene]]:

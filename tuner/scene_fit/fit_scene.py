@@ -38,7 +38,7 @@ from vpltune.tuner.fitting.fit_own_loss import Loss, loss_name
 from vpltune.tuner.fitting.fit_placement import Trace
 from vpltune.tuner.fitting.fit_status import Descent, FitStatus, Outcome
 from vpltune.tuner.fitting.search_space import SearchSpace
-from vpltune.tuner.frame_time.fit_budget import BudgetOptions
+from vpltune.tuner.frame_time.fit_budget import BudgetOptions, Front
 from vpltune.tuner.frame_time.frame_budget import LEAST_COUNT
 from vpltune.tuner.frame_time.least_frame import require_possible_budget
 from vpltune.tuner.reference.content_key import scene_digest
@@ -75,9 +75,9 @@ def fit_scene(
 ) -> FitResult:
     """Fit a scene; write tuned.json, views.json, metrics.json, images.npz and comparison.png to `output`.
 
-    No file is written before the fit and its measurement are done, except a front of `options.budget`, and
-    none is ever half written. References are kept in the user's cache as soon as they are rendered, so an
-    interrupted run does not render them again.
+    A front of `options.budget` is written with them. No file is written before the fit and its measurement
+    are done, and all change together. References are kept in the user's cache as soon as they are rendered,
+    so an interrupted run does not render them again.
 
     Args:
         source: a scene file, or a scene in memory.
@@ -108,7 +108,7 @@ def fit_scene(
     drawn = [view.drawn_with.parameters for view in fitted if view.drawn_with is not None]
     start = replace(options.start, parameters=fit_start(options.start, drawn), auto=None)
     if any(view.lit for view in fitted):
-        found = _judged(prepared, start, options, output, watch, progress)
+        found = _judged(prepared, start, options, watch, progress)
     else:
         found = _unlit(start)
     with watch.stage("evaluate"):
@@ -168,17 +168,21 @@ def fit_scene(
         comparison=comparison_image(prepared.runtime, evaluation.most_and_least_gained()),
     )
     if output is not None:
-        _write(result, output)
+        _write(result, output, found.front)
     return result
 
 
-def _write(result: FitResult, output: Path) -> None:
+def _write(result: FitResult, output: Path, front: Front | None) -> None:
     with written_together(output) as folder:
+        if front is not None:
+            front.write(folder)
         write_views(folder / "views.json", result.document["scene"], result.views)
         write_png(folder / "comparison.png", result.comparison)
         write_view_images(folder / "images.npz", result.evaluation.views)
         write_config(folder / "tuned.json", result.config)
         write_text_whole(folder / "metrics.json", strict_json(result.document) + "\n")
+    if front is not None:
+        front.end(output)
 
 
 def _require_compatible(options: FitOptions, output: Path | None) -> None:
@@ -218,6 +222,8 @@ class _Found:
     notes: tuple[str, ...] = ()
     document: dict[str, Any] = field(default_factory=dict)
     """Further keys of metrics.json."""
+    front: Front | None = None
+    """The Pareto front, if one was asked for."""
 
 
 def _unlit(start: TunedConfig) -> _Found:
@@ -230,7 +236,6 @@ def _judged(
     prepared: PreparedScene,
     start: TunedConfig,
     options: FitOptions,
-    output: Path | None,
     watch: Stopwatch,
     progress: Progress,
 ) -> _Found:
@@ -239,7 +244,6 @@ def _judged(
         found = search(
             prepared,
             start,
-            output,
             budget=options.budget,
             loss=options.loss,
             seed=options.seed,
@@ -287,6 +291,7 @@ def _judged(
         found.views,
         notes,
         found.document,
+        found.front,
     )
 
 

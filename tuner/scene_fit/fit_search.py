@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 from vpltune.renderer.config.artist_parameters import ArtistParameters
@@ -17,7 +16,7 @@ from vpltune.tuner.fitting.fit_status import Descent
 from vpltune.tuner.fitting.fit_views import robust_errors
 from vpltune.tuner.fitting.search_space import SearchSpace
 from vpltune.tuner.fitting.uncertainty import Interval, fit_with_intervals, open_intervals
-from vpltune.tuner.frame_time.fit_budget import BudgetOptions, fit_to_budget
+from vpltune.tuner.frame_time.fit_budget import BudgetOptions, Front, fit_to_budget
 from vpltune.tuner.surrogate.captured_view import CapturedView, capture_views
 
 
@@ -37,12 +36,13 @@ class Search:
     """The lit fitted views, captured with the tuned placement."""
     document: dict[str, Any] = field(default_factory=dict)
     """Further keys of metrics.json: `density`, `budget` and `pareto`, or `placements`."""
+    front: Front | None = None
+    """What `budget` asked for; its files are part of the fit's."""
 
 
 def search(
     prepared: PreparedScene,
     start: TunedConfig,
-    output: Path | None,
     *,
     budget: BudgetOptions | None,
     loss: Loss | None,
@@ -55,7 +55,6 @@ def search(
     Args:
         prepared: the scene; at least one of its fitted views is lit.
         start: where the search begins; has no prior.
-        output: folder that a front of `budget` is written to; may be None without a front.
         budget: pick VPL count and quality settings that meet a frame time; overrides the start's.
         loss: replaces the built-in objective (`tuner.fitting.fit_own_loss`); excludes `budget`.
         seed: selects pixels and rotations.
@@ -70,9 +69,10 @@ def search(
         tuned, descent = fit_own_loss(views, start.parameters, loss, seed=seed, progress=progress)
         return Search(start.parameters, tuned, start.quality, descent, {}, views)
     if budget is not None:
-        met, descent, found = fit_to_budget(prepared, start, budget, output, seed=seed, progress=progress)
+        met, descent, found, front = fit_to_budget(prepared, start, budget, seed=seed, progress=progress)
         start = replace(start, quality=met.quality)
-        return _recaptured(prepared, views, start, met.parameters, descent, found, seed)
+        made = _recaptured(prepared, views, start, met.parameters, descent, found, seed)
+        return replace(made, front=front)
     if start.parameters.vpl_count <= FEW_VPLS:
         fit = fit_density(prepared.runtime, views, start, seed=seed, progress=progress, traced=traced)
         found = {"density": density_document(prepared.runtime, views, start, fit, seed)}

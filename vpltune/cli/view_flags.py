@@ -10,7 +10,8 @@ from vpltune.cli.options import parse_numbers
 from vpltune.cli.view_options import ViewFlags
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.files.environment_file import ENVIRONMENT_SUFFIXES, is_environment_file
-from vpltune.renderer.scene.files.limits import LARGEST_RADIOMETRIC
+from vpltune.renderer.scene.files.limits import ENDLESS_RANGE, LARGEST_RADIOMETRIC
+from vpltune.renderer.scene.light_range import checked_range
 from vpltune.renderer.scene.placement.given_sky import GivenSky
 from vpltune.renderer.scene.scene import Camera, Light
 from vpltune.renderer.scene.spot_cone import checked_cone
@@ -58,6 +59,7 @@ def light_from_flags(flags: ViewFlags) -> Light | None:
         "--light-direction": flags.light_direction,
         "--light-intensity": flags.light_intensity,
         "--light-cone": flags.light_cone,
+        "--light-range": flags.light_range,
     }
     present = [flag for flag, value in given.items() if value is not None]
     if flags.light_type is None:
@@ -67,14 +69,15 @@ def light_from_flags(flags: ViewFlags) -> Light | None:
     intensity = _intensity(flags.light_intensity)
     if flags.light_type == "point":
         _refuse(present, "point", "--light-look-at", "--light-direction", "--light-cone")
-        return Light("point", intensity, _position(flags), name="from flags")
+        return Light("point", intensity, _position(flags), name="from flags", range=_range(flags))
     if flags.light_type == "directional":
-        _refuse(present, "directional", "--light-cone")
+        _refuse(present, "directional", "--light-cone", "--light-range")
         if flags.light_position is not None and flags.light_look_at is None:
             raise InputError("--light-position: a directional light takes it only with --light-look-at")
         return Light("directional", intensity, direction_world=_direction(flags), name="from flags")
     inner, outer = _cone(flags.light_cone)
-    return Light("spot", intensity, _position(flags), _direction(flags), inner, outer, name="from flags")
+    place, direction, reach = _position(flags), _direction(flags), _range(flags)
+    return Light("spot", intensity, place, direction, inner, outer, name="from flags", range=reach)
 
 
 def sky_from_flags(sky: str | None, environment: Path | None) -> GivenSky | None:
@@ -139,6 +142,11 @@ def _direction(flags: ViewFlags) -> Float64[np.ndarray, "3"]:
 def _cone(text: str | None) -> tuple[float, float]:
     inner, outer = DEFAULT_CONE_DEGREES if text is None else parse_numbers(text, "--light-cone", (2,))
     return checked_cone(inner, outer, "degrees", "--light-cone")
+
+
+def _range(flags: ViewFlags) -> float:
+    reach = math.inf if flags.light_range is None else checked_range(flags.light_range, "--light-range")
+    return reach if reach < ENDLESS_RANGE else math.inf
 
 
 def _refuse(present: list[str], light_type: str, *flags: str) -> None:

@@ -55,6 +55,9 @@ class ViewFlags:
     light_cone: Annotated[
         str | None, _view_option("INNER,OUTER", "Half angles of a spot, in degrees. [0,45]")
     ] = None
+    light_range: Annotated[
+        float | None, _view_option("R", "Where a spot or point light ends, in world units. [no end]")
+    ] = None
     sky: SkyOption = None
     environment: EnvironmentOption = None
 

@@ -81,11 +81,7 @@ def read_light(
     most = LARGEST_RADIOMETRIC if kind == "directional" else LARGEST_NUMBER
     strength = light.number("intensity", 1.0, low=0.0, high=most)
     inner, outer = _cone(light, document) if kind == "spot" else (0.0, math.pi / 4)
-    reach = math.inf
-    if kind != "directional" and "range" in light.members:
-        reach = light.number("range", low=SMALLEST_RANGE, high=LARGEST_NUMBER)
-        # Some write a very large number for a light that does not end.
-        reach = reach if reach < ENDLESS_RANGE else math.inf
+    reach = math.inf if kind == "directional" else _range(light)
     intensity = strength * color
     if intensity.max() > most:
         raise SceneFileError(f"{light.where}: color times intensity must be at most {most:g}")
@@ -106,6 +102,14 @@ def read_light(
         name=label(light.string("name", ""), light.where),
         range=reach,
     )
+
+
+def _range(light: JsonObject) -> float:
+    value = light.members.get("range", math.inf)
+    # Exporters write a vast number for a light that does not end, such as the largest of single precision.
+    if isinstance(value, float | int) and not isinstance(value, bool) and value >= ENDLESS_RANGE:
+        return math.inf
+    return light.number("range", low=SMALLEST_RANGE, high=ENDLESS_RANGE)
 
 
 def _cone(light: JsonObject, document: GltfDocument) -> tuple[float, float]:

@@ -37,6 +37,8 @@ class BaseColor:
     """The set of texture coordinates, n of TEXCOORD_n, for all textures; None without a texture."""
     uv_transform: Float64[np.ndarray, "2 3"] | None = None
     """The KHR_texture_transform, if any."""
+    has_alpha: bool = False
+    """Whether the alpha mode of the file lets alpha count, even where no texel and no factor is below 1."""
 
 
 class GltfMaterials:
@@ -120,8 +122,8 @@ class GltfMaterials:
         self.materials.append(read)
         placed = placed or glow.placed
         if placed is None:
-            return BaseColor(len(self.materials) - 1)
-        return BaseColor(len(self.materials) - 1, uv_set(placed), uv_transform(placed))
+            return BaseColor(len(self.materials) - 1, has_alpha=mode != "opaque")
+        return BaseColor(len(self.materials) - 1, uv_set(placed), uv_transform(placed), mode != "opaque")
 
     def _transmitting(
         self, read: Material, material: JsonObject, color: JsonObject | None, matt: float

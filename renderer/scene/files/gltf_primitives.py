@@ -15,6 +15,7 @@ from vpltune.renderer.scene.files.gltf_textures import transformed_uv
 from vpltune.renderer.scene.files.json_object import JsonObject
 from vpltune.renderer.scene.files.limited_decoder import LimitedDecoder
 from vpltune.renderer.scene.files.limits import MAX_MORPH_BYTES, DecodedBytes
+from vpltune.renderer.scene.files.opacity import OPAQUE
 from vpltune.renderer.scene.files.surface import Surface, finished_mesh, used_vertices
 from vpltune.renderer.scene.scene import Mesh
 from vpltune.renderer.scene.scene_animation import Skinning
@@ -90,7 +91,7 @@ class GltfPrimitives:
             renumbered.reshape(-1, 3),
             normals,
             self._uv(attributes, used, base_color),
-            self._colors(attributes, used),
+            self._colors(attributes, used, base_color.has_alpha),
             skinning,
         )
         return finished_mesh(surface, name, base_color.material, self._document.decoded, primitive.where)
@@ -210,11 +211,17 @@ class GltfPrimitives:
         return transformed_uv(uv, base_color.uv_transform)
 
     def _colors(
-        self, attributes: dict[str, Elements], used: Int64[np.ndarray, " used"]
+        self, attributes: dict[str, Elements], used: Int64[np.ndarray, " used"], has_alpha: bool
     ) -> Float32[np.ndarray, "used 3"] | None:
         if "COLOR_0" not in attributes:
             return None
-        colors = attributes["COLOR_0"].as_floats(used)[:, :3]
+        stored = attributes["COLOR_0"].as_floats(used)
+        colors, alpha = stored[:, :3], stored[:, 3:]
+        if has_alpha and alpha.size and alpha.min() < OPAQUE:
+            self._document.warnings.tally(
+                "1 primitive has vertex colours with alpha; alpha counts as 1",
+                "{n} primitives have vertex colours with alpha; alpha counts as 1",
+            )
         if colors.min() < 0.0 or colors.max() > 1.0:
             self._document.warnings.tally(
                 "1 primitive has vertex colours outside [0, 1]; they are clamped",

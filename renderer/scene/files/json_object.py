@@ -10,7 +10,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float64
 
-from vpltune.renderer.files.strict_json import DuplicateKeyError, no_constant, unique_keys
+from vpltune.renderer.files.strict_json import (
+    DuplicateKeyError,
+    NotFiniteError,
+    finite_float,
+    no_constant,
+    not_finite_at,
+    unique_keys,
+)
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, mebibytes
 from vpltune.renderer.scene.files.limits import LARGEST_NUMBER, MAX_JSON_BYTES, MAX_JSON_VALUES
 
@@ -184,7 +191,7 @@ def parse_json(content: bytes) -> JsonObject:
             text,
             object_pairs_hook=unique_keys,
             parse_constant=no_constant,
-            parse_float=_finite_float,
+            parse_float=finite_float,
         )
     except SceneFileError:
         raise
@@ -192,6 +199,8 @@ def parse_json(content: bytes) -> JsonObject:
         raise SceneFileError(f"the document: key {str(error)!r:.60} appears twice in one object") from error
     except RecursionError as error:
         raise SceneFileError("the document: JSON is nested too deep") from error
+    except NotFiniteError as error:
+        raise SceneFileError(f"{not_finite_at(text)}: {error}") from error
     except ValueError as error:
         raise SceneFileError(f"the document: is not JSON ({error})") from error
     return _as_object(document, "")
@@ -240,10 +249,3 @@ def _whole(value: Any) -> int | None:
         return None
     # Beyond 2**53 a double cannot represent every whole number.
     return int(value) if value == value // 1 and abs(value) <= 2**53 else None
-
-
-def _finite_float(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise SceneFileError(f"the document: number {text:.40} is too large")
-    return value

@@ -8,8 +8,8 @@ from dataclasses import replace
 from vpltune.renderer.scene.files.diagnostics import Warnings
 from vpltune.renderer.scene.scene import Material, Texture
 
-# Half a step of eight bits below 1: a blended surface this opaque is opaque.
-_OPAQUE = 1.0 - 0.5 / 255.0
+OPAQUE = 1.0 - 0.5 / 255.0
+"""Half a step of eight bits below 1: a blended surface this opaque is opaque."""
 
 
 def without_idle_alpha(material: Material, texture: Texture | None) -> Material:
@@ -21,7 +21,7 @@ def without_idle_alpha(material: Material, texture: Texture | None) -> Material:
     """
     if material.is_opaque:
         return material
-    if _least_opacity(material, texture) >= (_OPAQUE if material.is_blended else material.alpha_cutoff):
+    if _least_opacity(material, texture) >= (OPAQUE if material.is_blended else material.alpha_cutoff):
         return replace(material, alpha_mode="opaque", opacity=1.0)
     return material
 

@@ -28,6 +28,8 @@ _LONGEST_LITERAL = 128
 def hdr_pixels(content: bytes, where: str) -> Float32[np.ndarray, "height width 3"]:
     """Red, green and blue, row 0 at the top, divided by the file's EXPOSURE if there is one.
 
+    Bytes after the last row are passed over, as in PLY, .glb and other images.
+
     Args:
         content: the file.
         where: its place or name, for messages.
@@ -45,9 +47,11 @@ def hdr_pixels(content: bytes, where: str) -> Float32[np.ndarray, "height width 
     if found is None or not newline:
         raise SceneFileError(f"{where}: must have a line like -Y 512 +X 1024, got {_shown(line)}")
     height, width = int(found[1]), int(found[2])
+    if not height or not width:
+        raise SceneFileError(f"{where}: must have at least one pixel, got {width} × {height}")
     # The fewest bytes of a row: a marker of four, and 127 pixels of one component for each two.
     fewest = height * min(4 * width, 4 + 8 * -(-width // 127))
-    if not 0 < height <= MAX_IMAGE_SIDE or not 0 < width <= MAX_IMAGE_SIDE or height * width > MOST_PIXELS:
+    if max(height, width) > MAX_IMAGE_SIDE or height * width > MOST_PIXELS:
         raise SceneFileError(
             f"{where}: must be at most {MAX_IMAGE_SIDE} pixels on a side and {MOST_PIXELS:,} in all, "
             f"got {width} × {height}"

@@ -5,8 +5,8 @@ from pathlib import Path
 from vpltune.renderer.scene.files.diagnostics import SceneFileError, Warnings
 from vpltune.renderer.scene.files.scene_folder import SceneFolder
 
-# A choice: most <path> elements. Each file is looked for in all of them.
-_MOST_PATHS = 32
+MOST_PATHS = 32
+"""A choice: most <path> elements. Each file is looked for in all of them."""
 
 
 class SearchedFolder(SceneFolder):
@@ -22,8 +22,8 @@ class SearchedFolder(SceneFolder):
         Raises:
             SceneFileError: there are too many search paths.
         """
-        if len(self._search) == _MOST_PATHS:
-            raise SceneFileError(f"{where}: a scene must have at most {_MOST_PATHS} search paths")
+        if len(self._search) == MOST_PATHS:
+            raise SceneFileError(f"{where}: a scene must have at most {MOST_PATHS} search paths")
         try:
             is_folder = super()._inside(relative, where).is_dir()
         except SceneFileError:

@@ -227,10 +227,17 @@ def _numbers(
     if key not in table:
         raise InputError(f"{where}: key '{key}' is missing")
     value = table[key]
-    items = value if isinstance(value, list) else [value]
+    listed = isinstance(value, list)
+    items = value if listed else [value]
     # TOML has inf and nan, and bool is a subclass of int.
     plain = all(isinstance(item, int | float) and not isinstance(item, bool) for item in items)
-    if not plain or len(items) not in counts or not all(abs(item) <= most for item in items):
+    # One number is no list: [3] would be a slip for three.
+    if (
+        not plain
+        or len(items) not in counts
+        or listed != (len(items) > 1)
+        or not all(abs(item) <= most for item in items)
+    ):
         wanted = " or ".join(str(count) for count in counts)
         raise InputError(
             f"{where}: '{key}' must be {wanted} finite number{'s' * (counts != (1,))}, got {value!r:.60}; "

@@ -1,5 +1,6 @@
 """A disk that is full or read-only: one line that names the file, and nothing half-written."""
 
+import math
 import os
 import resource
 import subprocess
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.errors import InputError, MachineError
 from vpltune.renderer.export.scene_bundle import SceneBundle, write_bundle
 from vpltune.renderer.files import atomic_file, unfinished_files
@@ -20,6 +22,7 @@ from vpltune.renderer.files.atomic_file import (
 )
 from vpltune.renderer.files.image_file import write_exr, write_png
 from vpltune.renderer.files.video_file import clip_writer
+from vpltune.tuner.prior.train_prior import write_prior
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 NOISE = np.random.default_rng(0).integers(0, 256, (256, 256, 3), np.uint8)
@@ -97,6 +100,35 @@ def test_a_set_changes_whole(tmp_path, small_files):
         write_text_whole(folder / "c.txt", "new")
     assert (tmp_path / "b.txt").read_text() == "old"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.txt", "b.txt", "c.txt"]
+
+
+def test_a_set_may_have_folders(tmp_path):
+    (tmp_path / "below").mkdir()
+    (tmp_path / "below" / "mine.txt").write_text("mine")
+    with written_together(tmp_path) as folder:
+        write_text_whole(folder / "below" / "a.txt", "new")
+        write_text_whole(folder / "far" / "off" / "b.txt", "new")
+    left = {str(path.relative_to(tmp_path)): path.read_text() for path in tmp_path.rglob("*.txt")}
+    assert left == {"below/mine.txt": "mine", "below/a.txt": "new", "far/off/b.txt": "new"}
+    (tmp_path / "file").write_text("")
+    with (
+        pytest.raises(InputError, match="must be a folder, got a file"),
+        written_together(tmp_path) as folder,
+    ):
+        write_text_whole(folder / "below" / "a.txt", "newer")
+        write_text_whole(folder / "file" / "b.txt", "newer")
+    assert (tmp_path / "below" / "a.txt").read_text() == "new"
+
+
+def test_a_prior_and_its_card_change_together(tmp_path, small_files):
+    output = tmp_path / "prior.json"
+    write_prior(output, TunedConfig(), "old")
+    with pytest.raises(MachineError, match=r"prior\.md: cannot be written"):
+        write_prior(output, TunedConfig(), "x" * 2 * LIMIT_BYTES)
+    with pytest.raises(InputError, match="provenance"):
+        write_prior(output, TunedConfig(provenance={"seconds": math.nan}), "new")
+    assert (tmp_path / "prior.md").read_text() == "old"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["prior.json", "prior.md"]
 
 
 def test_a_bundle_changes_whole(tmp_path, small_files):

@@ -1,5 +1,7 @@
 """Bouncing lights stay in free space, conserve energy, and depend on time and seed alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from built_scenes import ROOM_LIGHTS, colored_room
@@ -7,6 +9,7 @@ from built_scenes import ROOM_LIGHTS, colored_room
 from vpltune.renderer.scene.dynamic_lights import DynamicLights
 from vpltune.renderer.scene.light_motion import BRIGHTNESS, GRAVITY, SPOT_CONE, BouncingLights, flux_beside
 from vpltune.renderer.scene.placement.free_space import free_space
+from vpltune.renderer.scene.placement.sight import light_hits
 from vpltune.renderer.scene.scene import scaled, scaled_light
 
 
@@ -102,3 +105,19 @@ def test_flux_beside_a_view_grows_with_its_lights_and_with_the_scene():
         assert grown == pytest.approx(100.0 * plain, rel=1e-4)
     area = sum(4.0 for _ in range(5)) + np.linalg.norm(np.cross([0.7, 0.5, 0.0], [0.0, 0.05, 0.7]))
     assert flux_beside(scene, ()) == pytest.approx(BRIGHTNESS * np.pi * area, rel=1e-2)
+
+
+def test_flux_beside_a_light_follows_its_range():
+    """At the RMS distance d of the surfaces within range, 1 − (d/range)⁴ of the light is left."""
+    scene = colored_room()
+    light = replace(ROOM_LIGHTS["spot"], range=np.inf)
+    hits, space = light_hits(free_space(scene), light), free_space(scene)
+    distance = hits.distance[hits.hit] * space.voxel_world
+    endless = flux_beside(scene, (light,))
+    for end in (1.5 * distance.max(), float(np.median(distance))):
+        square = (distance[distance < end] ** 2).mean()
+        expected = endless * (distance**2).mean() / square * (1.0 - square**2 / end**4)
+        assert flux_beside(scene, (replace(light, range=float(end)),)) == pytest.approx(expected)
+        assert expected != pytest.approx(endless, rel=0.01)
+    # No surface is within range: as without lights.
+    assert flux_beside(scene, (replace(light, range=1e-3),)) == flux_beside(scene, ())

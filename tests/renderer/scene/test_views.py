@@ -62,6 +62,11 @@ def test_a_byte_order_mark_and_a_hard_edge_are_read(tmp_path):
         (ranged(0), r"views\[0\]\.lights\[0\]\.range: must be positive, at least 1e-30, got 0"),
         (ranged(-3), r"lights\[0\]\.range: must be positive"),
         (ranged("far"), r"lights\[0\]\.range: must be 1 finite number, got 'far'"),
+        (ranged([3]), r"lights\[0\]\.range: must be 1 finite number, got \[3\]"),
+        (
+            json.dumps({"views": [VIEW]}).replace("0.8", "[0.8]"),
+            r"yfov: must be 1 finite number, got \[0\.8\]",
+        ),
         (ranged(None), r"lights\[0\]\.range: must be 1 finite number"),
         ("[" * 100_000, "nested too deep"),
         (json.dumps({"views": [VIEW]}).replace("[8, 6]", "[" * 900 + "]" * 900), "size: must be|nested too"),

@@ -153,6 +153,22 @@ def test_names_in_xml_are_read_with_either_quote_and_entities(tmp_path):
     assert referred_files(tmp_path / "a.xml") == (tmp_path / "a.obj", tmp_path / "b & c.ply")
 
 
+def test_search_paths_of_mitsuba_are_followed(tmp_path):
+    """Mitsuba takes the last folder first, and then the scene's own; a default may name the file."""
+    library_of(tmp_path, a__x_obj=b"", b__y_obj=b"")
+    (tmp_path / "scene.xml").write_text(
+        "<scene><path value='a'/><path value='b'/><path value='..'/><path value='absent'/>"
+        "<default name='m' value='x.obj'/>"
+        "<shape type='obj'><string name='filename' value='$m'/></shape></scene>"
+    )
+    expected = (tmp_path / "b" / "x.obj", tmp_path / "a" / "x.obj", tmp_path / "x.obj")
+    assert referred_files(tmp_path / "scene.xml") == expected
+    assert list(library_scenes(tmp_path, leave_out=tmp_path / "out")) == ["b/y.obj", "scene.xml"]
+    before = digest(tmp_path / "scene.xml")
+    (tmp_path / "b" / "x.obj").write_bytes(b"v 0 0 0")  # it goes before that of the folder a
+    assert digest(tmp_path / "scene.xml") != before
+
+
 def digest(scene):
     return SceneInputs(scene.parent / "absent").digest(scene)[0]
 

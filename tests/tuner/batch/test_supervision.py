@@ -9,13 +9,17 @@ import subprocess
 import sys
 import threading
 import time
+from multiprocessing import Pipe
 from pathlib import Path
+from types import SimpleNamespace
 
 import psutil
 import pytest
 
 from vpltune.cli.program import run
 from vpltune.renderer.errors import MachineError
+from vpltune.renderer.gpu import gpu_context
+from vpltune.tuner.batch import tuning_process
 from vpltune.tuner.batch.attempts import tune_with_retries
 from vpltune.tuner.batch.local_scheduler import tune_locally
 from vpltune.tuner.batch.supervised_process import Limits, StoppedError, SupervisedProcess, memory_of
@@ -46,6 +50,8 @@ while True:
         os._exit(7)
     elif does == "no machine":
         send(connection, {"machine_error": "no OpenGL"})
+    elif does == "too large":
+        send(connection, {"failed": "the GPU ran out of memory", "renew": True})
     elif does == "second time" and order["attempt"] == 1:
         send(connection, {"failed": "ValueError: once"})
     else:
@@ -106,6 +112,48 @@ def test_a_second_attempt_may_succeed(supervised, make_job):
 def test_a_machine_that_lacks_something_is_no_scenes_fault(supervised, make_job):
     with pytest.raises(MachineError, match="no OpenGL"):
         tune_with_retries(supervised, make_job("no machine"), PLENTY, lambda event: None)
+
+
+@pytest.fixture
+def outcome_of(make_job, fits):
+    """What the tuning process answers where a fit raises `error`."""
+
+    def outcome(error: str) -> dict:
+        fits.error = MachineError(error)
+        ours, theirs = Pipe()
+        with ours, theirs:
+            return tuning_process._outcome(theirs, make_job(), 1)
+
+    return outcome
+
+
+def test_a_scene_too_large_for_this_gpu_fails_alone(outcome_of, monkeypatch):
+    made = []
+    context = SimpleNamespace(release=lambda: made.append("released"))
+    monkeypatch.setattr(gpu_context, "create_context", lambda: context)
+    failed = outcome_of("the depth texture: out of memory")
+    assert failed == {"failed": "the depth texture: out of memory", "renew": True}
+    assert made == ["released"]  # that a context can be made says that other scenes can be fitted
+
+
+def test_what_ends_every_fit_ends_the_batch(outcome_of, monkeypatch, make_job):
+    full = f"{make_job().folder}/scenes/a/tuned.json: cannot be written (No space left on device)"
+    assert outcome_of(full) == {"machine_error": full}
+
+    def no_context():
+        raise MachineError("no OpenGL")
+
+    monkeypatch.setattr(gpu_context, "create_context", no_context)
+    assert outcome_of("GL_OUT_OF_MEMORY") == {"machine_error": "GL_OUT_OF_MEMORY"}
+
+
+def test_the_scene_after_one_too_large_has_a_process_of_its_own(supervised, make_job):
+    supervised.attempt(make_job("next"), 1, PLENTY, lambda stage, share: None)
+    first = supervised._process.pid
+    failed = supervised.attempt(make_job("too large"), 1, PLENTY, lambda stage, share: None)
+    assert (failed.record, failed.failure) == (None, "the GPU ran out of memory")
+    supervised.attempt(make_job("next"), 1, PLENTY, lambda stage, share: None)
+    assert supervised._process.pid != first
 
 
 def test_stopping_ends_the_process(supervised, make_job):

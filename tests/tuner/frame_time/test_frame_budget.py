@@ -79,9 +79,10 @@ def test_no_frame_settles_on_fewer_vpls_than_a_budget_must_have(steady, prepared
 def test_the_front_is_monotone_and_written(steady, prepared, tmp_path, monkeypatch):
     """More time, less error; each point's config reads back, and table and plot are there."""
     monkeypatch.setattr(pareto_front, "POINTS", 3)
-    met, _, found = fit_to_budget(
-        prepared, START, BudgetOptions(None, pareto=True, frame_size=(24, 18)), tmp_path
-    )
+    options = BudgetOptions(None, pareto=True, frame_size=(24, 18))
+    met, _, found, front = fit_to_budget(prepared, START, options)
+    assert front is not None
+    front.write(tmp_path)
     points = found["pareto"]
     assert len(points) >= 2
     times = [point["milliseconds"] for point in points]

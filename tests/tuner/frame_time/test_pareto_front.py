@@ -3,6 +3,7 @@
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,13 +13,17 @@ from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.light_settings import ONE_BOUNCE
 from vpltune.renderer.config.quality import MetBudget, Quality
 from vpltune.renderer.config.tuned_config import TunedConfig, read_config
-from vpltune.renderer.errors import InputError
+from vpltune.renderer.errors import InputError, MachineError
 from vpltune.tuner.fitting.fit_status import Descent, FitStatus
 from vpltune.tuner.frame_time import pareto_front as front
 from vpltune.tuner.frame_time.cost_model import CostModel, PassCost
-from vpltune.tuner.frame_time.fit_budget import write_front
+from vpltune.tuner.frame_time.fit_budget import Front
 from vpltune.tuner.frame_time.frame_budget import BudgetFit, FrameBudget, SettledFrame
-from vpltune.tuner.frame_time.pareto_front import fit_front
+from vpltune.tuner.frame_time.pareto_front import fit_front, forget_front
+from vpltune.tuner.scene_fit import fit_scene
+from vpltune.tuner.scene_fit.fit_result import FitResult
+
+START = TunedConfig(visibility="maps", light=ONE_BOUNCE)
 
 
 class PlantedBudget(FrameBudget):
@@ -97,6 +102,7 @@ def test_a_front_is_made_of_the_times_that_were_measured_beside_each_other():
     """The second point turns out slower than the third, which is better: it goes. Times are the medians."""
     budget = PlantedBudget()
     fit_front(budget)
+    forget_front("planted")
     counts = budget.timed[: front.POINTS]
     assert budget.timed == counts * front.TURNS, "timed in turns"
     slow = PlantedBudget()
@@ -111,6 +117,7 @@ def test_a_front_is_made_of_the_times_that_were_measured_beside_each_other():
 
 def test_an_interrupted_front_goes_on_where_it_was(tmp_path):
     whole = fit_front(PlantedBudget())
+    forget_front("planted")
     first = PlantedBudget(interrupted_at=2)
     with pytest.raises(KeyboardInterrupt):
         fit_front(first)
@@ -127,7 +134,9 @@ def test_an_interrupted_front_goes_on_where_it_was(tmp_path):
         assert (point.frame_size, point.machine) == (same.frame_size, same.machine)
     assert shares == sorted(shares)
     assert (shares[0], shares[-1]) == (0.0, pytest.approx(1.0 - 0.5 / front.POINTS))
-    assert kept_files(tmp_path) == [], "one that is done is measured anew"
+    assert len(kept_files(tmp_path)) == 1, "until its files are written"
+    forget_front("planted")
+    assert kept_files(tmp_path) == [], "one that is written is measured anew"
 
 
 @pytest.mark.parametrize(
@@ -143,18 +152,62 @@ def test_a_damaged_file_of_a_front_is_no_front(tmp_path, damage):
 
 def test_budgets_that_are_not_met_are_left_out_unless_none_is():
     assert len(fit_front(PlantedBudget(refused=(0, 3)))) == front.POINTS - 2
+    forget_front("planted")
     assert len(fit_front(PlantedBudget(refused=(front.POINTS - 1,)))) == front.POINTS - 1
+    forget_front("planted")
     with pytest.raises(InputError, match="no frame could be measured"):
         fit_front(PlantedBudget(refused=range(front.POINTS)))
 
 
-def test_a_front_that_is_written_replaces_the_one_before(tmp_path):
-    """Configs, table and plot; none of a longer front that was there stays."""
+@pytest.fixture
+def write_fit(tmp_path, monkeypatch):
+    """Writes a fit with a front to the folder `out`; `metrics` is the text of metrics.json."""
+    for name in ("write_views", "write_png", "write_view_images", "write_config"):
+        monkeypatch.setattr(fit_scene, name, lambda *_: None)
+
+    def write(points, metrics: str = "old") -> list[dict]:
+        front_of = Front(points, START, (64, 48), "planted")
+        result = object.__new__(FitResult)
+        parts = {"views": (), "comparison": None, "evaluation": SimpleNamespace(views=()), "config": None}
+        for name, value in {**parts, "document": {"scene": metrics}}.items():
+            object.__setattr__(result, name, value)
+        fit_scene._write(result, tmp_path / "out", front_of)
+        return front_of.rows()
+
+    return write
+
+
+def test_a_front_changes_with_its_fit(tmp_path, write_fit, monkeypatch):
+    """Where metrics.json cannot be written, the former front stays, and the new one's fits are kept."""
     points = fit_front(PlantedBudget())
-    start = TunedConfig(visibility="maps", light=ONE_BOUNCE)
-    write_front(tmp_path, points, start, (64, 48))
-    rows = write_front(tmp_path, points[:2], start, (64, 48))
-    written = sorted(Path(tmp_path / "pareto").iterdir())
+    write_fit(points)
+    fit_front(PlantedBudget())
+    before = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()}
+    assert {path.name for path in before} >= {"0.json", "pareto.csv", "pareto.png", "metrics.json"}
+
+    def full(path, text):
+        raise MachineError(f"{path}: cannot be written (No space left on device)")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(fit_scene, "write_text_whole", full)
+        with pytest.raises(MachineError, match=r"out/metrics\.json: cannot be written"):
+            write_fit(points[:2])
+    assert before == {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()}
+    assert len(kept_files(tmp_path)) == 1
+    write_fit(points[:2])
+    assert kept_files(tmp_path) == []
+
+
+def test_a_front_that_is_written_replaces_the_one_before(tmp_path, write_fit):
+    """Configs, table and plot; none of a longer front that was there stays. A file of one's own does."""
+    points = fit_front(PlantedBudget())
+    write_fit(points)
+    out = tmp_path / "out"
+    (out / "pareto" / "0.notes.txt").write_text("mine")
+    rows = write_fit(points[:2])
+    assert (out / "pareto" / "0.notes.txt").read_text() == "mine"
+    (out / "pareto" / "0.notes.txt").unlink()
+    written = sorted(Path(out / "pareto").iterdir())
     assert [path.name for path in written] == ["0.json", "1.json"]
     for path, point, row in zip(written, points, rows, strict=False):
         config = read_config(path)
@@ -163,9 +216,9 @@ def test_a_front_that_is_written_replaces_the_one_before(tmp_path):
         assert config.quality == replace(point.frame.choice, budget=met)
         assert config.provenance["milliseconds"] == point.frame.milliseconds
         assert row["frame_size"] == [64, 48]
-    head, *lines = (tmp_path / "pareto.csv").read_text().splitlines()
+    head, *lines = (out / "pareto.csv").read_text().splitlines()
     assert head == "milliseconds,relmse,vpl_count,interleave,map_size,rsm_resolution,config"
     assert [line.split(",")[-1] for line in lines] == ["pareto/0.json", "pareto/1.json"]
     assert len({line.count(",") for line in (head, *lines)}) == 1
-    assert (tmp_path / "pareto.png").read_bytes()[:4] == b"\x89PNG"
+    assert (out / "pareto.png").read_bytes()[:4] == b"\x89PNG"
     assert len(budget_lines({"pareto": rows})) == 1

@@ -39,7 +39,7 @@ ROWS = {
     "Mitsuba": (
         f"{xml_tree._MOST_NODES:,} elements, {limits.MAX_INSTANCES:,} shapes and {limits.MAX_INSTANCES:,} "
         f"placed, {plugin_tree._LONGEST_VALUE:,} characters of an attribute with its defaults, "
-        f"{searched_folder._MOST_PATHS} search paths"
+        f"{searched_folder.MOST_PATHS} search paths"
     ),
     "intensity of a light": f"{limits.LARGEST_RADIOMETRIC:.0e} W/sr".replace("+", ""),
     "cost": (

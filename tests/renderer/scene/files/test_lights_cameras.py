@@ -73,9 +73,10 @@ def test_point_and_directional(triangle, kind):
         ({"spot": {"innerConeAngle": -0.1}}, r"lights\[0\]\.spot: cone angles must satisfy"),
         (
             {"range": 0},
-            r"lights\[0\]\.range: must be a finite number from 1e-30 to 1e\+30, got 0",
+            r"lights\[0\]\.range: must be a finite number from 1e-30 to 1e\+18, got 0",
         ),
         ({"range": -2.5}, r"lights\[0\]\.range: must be a finite number from 1e-30 .*, got -2\.5"),
+        ({"range": True}, r"lights\[0\]\.range: must be a finite number"),
         ({"range": "far"}, r"lights\[0\]\.range: must be a finite number"),
         ({"range": None}, r"lights\[0\]\.range: must be a finite number"),
     ],
@@ -105,7 +106,8 @@ def test_a_range_is_read_whatever_the_scale_of_the_node(triangle, kind):
 
 
 def test_without_a_range_or_with_a_vast_one_light_does_not_end(triangle):
-    for light in ({"type": "point"}, {"type": "point", "range": 1e30}):
+    vast = (1e18, 1e30, 3.4028234663852886e38, 1.7e308, 10**400)
+    for light in ({"type": "point"}, *({"type": "point", "range": value} for value in vast)):
         (point,) = read_scene(with_light(triangle, light)).lights
         assert point.range == np.inf
 

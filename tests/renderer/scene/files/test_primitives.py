@@ -95,6 +95,22 @@ def test_vertex_colours_are_linear_and_their_alpha_is_left_aside(gltf, colors, i
     assert scene.warnings == ()
 
 
+@pytest.mark.parametrize(
+    ("mode", "alpha", "said"),
+    [
+        ("BLEND", [1.0, 0.5, 1.0], True),
+        ("MASK", [1.0, 0.0, 1.0], True),
+        ("BLEND", [1.0, 1.0, 1.0], False),
+        ("OPAQUE", [1.0, 0.5, 1.0], False),
+    ],
+)
+def test_alpha_of_vertex_colours_gets_a_word_where_it_would_count(gltf, mode, alpha, said):
+    colors = np.column_stack([np.ones((3, 3)), alpha]).astype(np.float32)
+    gltf.add_primitive(COLOR_0=colors)["material"] = gltf.add("materials", {"alphaMode": mode})
+    warnings = read_scene(gltf.write()).warnings
+    assert warnings == (("1 primitive has vertex colours with alpha; alpha counts as 1",) if said else ())
+
+
 def test_vertex_colours_beyond_one_are_clamped_aloud(gltf):
     gltf.add_primitive(COLOR_0=np.full((3, 3), 1.5, np.float32))
     scene = read_scene(gltf.write())

@@ -74,6 +74,12 @@ def test_known_bytes():
     np.testing.assert_array_equal(hdr_pixels(flat(rgbe), ""), [[[1.0, 0.5, 0.0], [0.0, 0.0, 0.0]]])
 
 
+@pytest.mark.parametrize("form", [flat, packed])
+def test_bytes_after_the_last_row_change_nothing(form):
+    content = form(encoded(picture()))
+    np.testing.assert_array_equal(hdr_pixels(content + b"\1\2\3\4", ""), hdr_pixels(content, ""))
+
+
 def test_exposures_are_divided_out():
     rgbe = np.array([[[128, 128, 128, 129]]], np.uint8)
     exposed = flat(rgbe, b"EXPOSURE=4\nEXPOSURE= 0.5\n")
@@ -88,7 +94,11 @@ BROKEN = {
     "exposure": (lambda content: content.replace(b"\n\n", b"\nEXPOSURE=nan\n\n", 1), "EXPOSURE must be"),
     "exposed": (lambda content: content.replace(b"\n\n", b"\nEXPOSURE=1e-30\n\n", 1), "EXPOSURE must be"),
     "upside down": (lambda content: content.replace(SIZE, b"+Y 5 +X 40"), "must have a line like"),
-    "no rows": (lambda content: content.replace(SIZE, b"-Y 0 +X 40"), "must be at most"),
+    "no rows": (
+        lambda content: content.replace(SIZE, b"-Y 0 +X 40"),
+        "must have at least one pixel, got 40 × 0",
+    ),
+    "no columns": (lambda content: content.replace(SIZE, b"-Y 5 +X 0"), "must have at least one pixel"),
     "wide": (lambda content: content.replace(SIZE, b"-Y 1 +X 16385"), "must be at most"),
     "bomb": (lambda content: content.replace(SIZE, b"-Y 16000 +X 16000"), f"{MOST_PIXELS:,} in all"),
     "tall": (lambda content: content.replace(SIZE, b"-Y 2000 +X 4000"), "is cut short"),

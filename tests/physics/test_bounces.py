@@ -97,7 +97,7 @@ def test_many_discs_leave_less_in_the_corners(gl_context, albedo):
 
 @pytest.mark.parametrize("albedo", [0.5, 0.9])
 def test_walks_keep_all_the_light_of_a_furnace(gl_context, albedo):
-    """All bounces reflect A π L ρ/(1 − ρ). To 0.1 %: what ends by chance is evenly spread over 4,096 walks."""
+    """All bounces reflect A π L ρ/(1 − ρ). To 0.1 %: which walks end by chance is evenly spread."""
     captured = drawn(gl_context, box(albedo, RADIANCE), view_inside(), config_of("all"))
     area = 2.0 * (2.0 * 1.0 + 1.0 * 1.5 + 1.5 * 2.0)
     expected = area * np.pi * RADIANCE * albedo / (1.0 - albedo)
@@ -105,8 +105,8 @@ def test_walks_keep_all_the_light_of_a_furnace(gl_context, albedo):
 
 
 def test_surfaces_that_light_reaches_late_have_discs_of_their_own(gl_context):
-    """A flat box glows within and without, under a ceiling. What it emits never reaches its own top first, and
-    near below the top is the inside of its bottom, which faces up as well, and is bright.
+    """A flat box glows within and without, under a ceiling. What it emits never reaches its own top first.
+    Near below the top is the inside of its bottom, which faces up as well, and is bright.
 
     The top reflects ρ times what the ceiling above it sends back, but for what leaves at the sides: at least
     half as much as that part of the ceiling.
@@ -118,7 +118,8 @@ def test_surfaces_that_light_reaches_late_have_discs_of_their_own(gl_context):
     made = scene_of([ceiling, *glowing], [(0.95,) * 3, (0.95,) * 3])
     made = replace(made, materials=(made.materials[0], replace(made.materials[1], emission=(1.0, 1.0, 1.0))))
     captured = drawn(gl_context, made, view_inside(), config_of("all", parameters=FEW))
-    flux, place, facing = captured.vpl_flux[:, 0], captured.vpl_position_world, captured.vpl_normal_world[:, 1]
+    flux, place = captured.vpl_flux[:, 0], captured.vpl_position_world
+    facing = captured.vpl_normal_world[:, 1]
     above = (facing < -0.9) & (place[:, 1] > 0.03) & (np.abs(place[:, [0, 2]]) < 0.15).all(axis=1)
     top = (facing > 0.9) & (np.abs(place[:, 1] - 0.005) < 1e-4)
     assert flux[top].sum() > 0.5 * flux[above].sum() > 0.0

@@ -3,7 +3,7 @@
 import contextlib
 import errno
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from vpltune.renderer.errors import InputError, MachineError
@@ -57,11 +57,12 @@ def write_text_whole(path: Path, text: str) -> None:
 
 
 @contextlib.contextmanager
-def written_together(folder: Path) -> Iterator[Path]:
+def written_together(folder: Path, earlier: Sequence[str] = ()) -> Iterator[Path]:
     """Yield an empty folder in `folder`; on success, move all files in and below it to `folder`.
 
     So a set of files changes whole: what can fail, fails before the first one is replaced. Other files in
-    `folder` and below stay.
+    `folder` and below stay, but for those of an earlier set that this one lacks: `earlier` names them by
+    patterns.
 
     Raises:
         InputError, MachineError: as `written_whole`.
@@ -81,6 +82,9 @@ def written_together(folder: Path) -> Iterator[Path]:
             below.mkdir(parents=True, exist_ok=True)
         for path, named in ready.items():
             path.replace(named)
+        for left in [path for pattern in earlier for path in folder.glob(pattern)]:
+            if left not in ready.values() and left.is_file():
+                left.unlink()
     except (InputError, MachineError) as error:
         raise type(error)(str(error).replace(str(staging), str(folder))) from error
     finally:

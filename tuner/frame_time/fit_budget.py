@@ -83,6 +83,10 @@ def fit_to_budget(
     return best.config(start), best.descent, found, front
 
 
+FRONT_FILES = ("pareto.csv", "pareto.png", "pareto/[0-9]*.json")
+"""Patterns of all that `Front.write` writes."""
+
+
 @dataclass(frozen=True, eq=False)
 class Front:
     """A Pareto front, and how its files are written."""
@@ -124,12 +128,8 @@ class Front:
         write_text_whole(folder / "pareto.csv", "\n".join(lines) + "\n")
         write_plot(folder / "pareto.png", self.points)
 
-    def end(self, folder: Path) -> None:
-        """Call it once the files are in `folder`. The configs of an earlier front with more points go, and
-        the saved fits."""
-        for earlier in folder.glob("pareto/[0-9]*.json"):
-            if earlier.stem.isdecimal() and int(earlier.stem) >= len(self.points):
-                earlier.unlink()
+    def forget(self) -> None:
+        """Remove the saved fits of an interrupted search. Call it once the files are in their folder."""
         forget_front(self.content_key)
 
 

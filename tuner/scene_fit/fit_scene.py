@@ -38,7 +38,7 @@ from vpltune.tuner.fitting.fit_own_loss import Loss, loss_name
 from vpltune.tuner.fitting.fit_placement import Trace
 from vpltune.tuner.fitting.fit_status import Descent, FitStatus, Outcome
 from vpltune.tuner.fitting.search_space import SearchSpace
-from vpltune.tuner.frame_time.fit_budget import BudgetOptions, Front
+from vpltune.tuner.frame_time.fit_budget import FRONT_FILES, BudgetOptions, Front
 from vpltune.tuner.frame_time.frame_budget import LEAST_COUNT
 from vpltune.tuner.frame_time.least_frame import require_possible_budget
 from vpltune.tuner.reference.content_key import scene_digest
@@ -173,7 +173,7 @@ def fit_scene(
 
 
 def _write(result: FitResult, output: Path, front: Front | None) -> None:
-    with written_together(output) as folder:
+    with written_together(output, FRONT_FILES) as folder:
         if front is not None:
             front.write(folder)
         write_views(folder / "views.json", result.document["scene"], result.views)
@@ -182,7 +182,7 @@ def _write(result: FitResult, output: Path, front: Front | None) -> None:
         write_config(folder / "tuned.json", result.config)
         write_text_whole(folder / "metrics.json", strict_json(result.document) + "\n")
     if front is not None:
-        front.end(output)
+        front.forget()
 
 
 def _require_compatible(options: FitOptions, output: Path | None) -> None:

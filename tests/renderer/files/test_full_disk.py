@@ -102,6 +102,25 @@ def test_a_set_changes_whole(tmp_path, small_files):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.txt", "b.txt", "c.txt"]
 
 
+def test_a_set_takes_the_place_of_an_earlier_one_with_other_files(tmp_path):
+    """And only if it is written; files of others stay."""
+    with written_together(tmp_path) as folder:
+        for name in ("a.txt", "front.csv", "front/0.json", "front/1.json"):
+            write_text_whole(folder / name, "old")
+    (tmp_path / "front" / "mine.txt").write_text("mine")
+    earlier = ("front.csv", "front/[0-9]*.json")
+    with pytest.raises(MachineError), written_together(tmp_path, earlier):
+        raise MachineError("full")
+    assert (tmp_path / "front" / "1.json").read_text() == "old"
+    with written_together(tmp_path, earlier) as folder:
+        write_text_whole(folder / "a.txt", "new")
+        write_text_whole(folder / "front" / "0.json", "new")
+    left = {
+        str(path.relative_to(tmp_path)): path.read_text() for path in tmp_path.rglob("*") if path.is_file()
+    }
+    assert left == {"a.txt": "new", "front/0.json": "new", "front/mine.txt": "mine"}
+
+
 def test_a_set_may_have_folders(tmp_path):
     (tmp_path / "below").mkdir()
     (tmp_path / "below" / "mine.txt").write_text("mine")

@@ -20,7 +20,9 @@ PANEL_WIDTH, PANEL_HEIGHT = 320, 240
 _MARGIN = 8
 """Pixels around a panel. A choice."""
 _CAPTION = 22
-"""Height of the caption above a panel, in pixels. A choice that fits a font of 14."""
+"""Height of the caption above a panel, in pixels. A choice that fits the largest font."""
+_FONT_SIZES = range(14, 7, -1)
+"""In pixels: the largest in which a caption is no wider than its panel. A choice."""
 
 Irradiance = Float32[np.ndarray, "height width 3"]
 Image8 = UInt8[np.ndarray, "height width 3"]
@@ -103,5 +105,8 @@ def _panel(image: Image8, caption: str, size: tuple[int, int]) -> Pixels:
     height, width, _ = image.shape
     panel = Image.new("RGB", (width + 2 * _MARGIN, height + _CAPTION + _MARGIN), "white")
     panel.paste(Image.fromarray(image), (_MARGIN, _CAPTION))
-    ImageDraw.Draw(panel).text((_MARGIN, 3), caption, fill="black", font=ImageFont.load_default(14))
+    drawing = ImageDraw.Draw(panel)
+    fonts = [ImageFont.load_default(size) for size in _FONT_SIZES]
+    font = next((each for each in fonts if drawing.textlength(caption, each) <= width), fonts[-1])
+    drawing.text((_MARGIN, 3), caption, fill="black", font=font)
     return np.asarray(panel)

@@ -28,7 +28,16 @@ class VplPools:
     """On glowing surfaces: light that was not reflected."""
 
     @classmethod
-    def of(cls, count: int, *, has_lights: bool, glows: bool, bounces: int | None) -> "VplPools":
+    def of(
+        cls,
+        count: int,
+        *,
+        has_lights: bool,
+        glows: bool,
+        bounces: int | None,
+        walks: int = WALKS,
+        later_share: float = LATER_SHARE,
+    ) -> "VplPools":
         """The pools of a config with `count` VPLs.
 
         Args:
@@ -36,13 +45,15 @@ class VplPools:
             has_lights: whether the view has a light with an RSM.
             glows: whether a surface glows.
             bounces: reflections before light reaches the receiver; None for all.
+            walks: light walks of a frame.
+            later_share: see `LATER_SHARE`.
         """
         # A disc of a single sample has no more than that sample's own guess of an area.
-        samples = WALKS * recorded_steps(bounces, has_lamps=has_lights, glows=glows)
+        samples = walks * recorded_steps(bounces, has_lamps=has_lights, glows=glows)
         most = min(LARGEST_DISC_COUNT, samples // SAMPLES_OF_DISC)
         if not has_lights and not glows:
             return cls(count)
-        later = min(most, max(1, round(LATER_SHARE * count)))
+        later = min(most, max(1, round(later_share * count)))
         if not glows:
             return cls(count, later)
         glowing = _share(GLOWING_SHARE, count)

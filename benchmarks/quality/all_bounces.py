@@ -5,7 +5,8 @@ The scenes are the first of the generator's from seed `REPORTED_SEED`, which cho
 
 relMSE is measured against the two independent halves a and b of a reference: (y − a)(y − b) in place of
 (y − r)², so that the reference's own noise cancels. The pixels with the largest products, `WORST` of all,
-are left out. Both light and errors are those of irradiance that was reflected. Frames of all bounces and of
+are left out. A room whose reference has more noise than `MOST_NOISE` has no relMSE: its weights, 1/r², would
+be noise too. Both light and errors are those of irradiance that was reflected. Frames of all bounces and of
 one are timed in turns.
 
 `python -m benchmarks.quality.all_bounces` prints a table of these figures, and one of choices of `WALKS` and
@@ -14,6 +15,7 @@ a folder named by a digest of the program: an interrupted run continues with the
 """
 
 import json
+import math
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -39,7 +41,7 @@ from vpltune.renderer.scene.scene import Scene
 from vpltune.renderer.scene.views import View
 from vpltune.tuner.metrics.relative_squared_error import relative_weight
 from vpltune.tuner.prior.scene_generator import generated_name, generated_scene
-from vpltune.tuner.reference import ReferenceView, reference_views
+from vpltune.tuner.reference import ReferenceView, noise_floor, reference_views
 from vpltune.tuner.surrogate.captured_view import CapturedView
 
 ROOMS = range(8)
@@ -57,6 +59,10 @@ REPEATS = 5
 WORST = 0.01
 """Share of the pixels, the worst, that relMSE leaves out; rounded up to whole pixels. A choice."""
 
+MOST_NOISE = 0.1
+"""Largest noise of a reference, see `noise_floor`, whose image has a relMSE. A choice: at 0.1, weights are a
+third too large in the mean."""
+
 ALL, ONE = TunedConfig(), TunedConfig(light=ONE_BOUNCE)
 
 
@@ -70,7 +76,8 @@ class Effort:
 
 
 Figures = dict[str, float]
-"""`energy`, ÷ the reference's, and `relmse`. A reported room has more, see `room_figures`."""
+"""`energy`, ÷ the reference's, and `relmse`, absent where the reference has too much noise. A reported room
+has more, see `room_figures`."""
 
 
 def rows(progress: Callable[[str, float], None]) -> Iterator[Row]:
@@ -94,10 +101,11 @@ def measured_rows(
 
 def room_rows(name: str, figures: Figures) -> list[Row]:
     """The rows of one room."""
+    errors = [figures.get(each, math.nan) for each in ("relmse", "one_bounce_relmse")]
     return [
         Row(f"{name}.one_bounce", figures["one_bounce"], "of the reference's light", "all bounces", 1.0),
         Row(f"{name}.energy", figures["energy"], "of the reference's light", "the reference", 1.0),
-        Row(f"{name}.relmse", figures["relmse"], "1", "an image of one bounce", figures["one_bounce_relmse"]),
+        Row(f"{name}.relmse", errors[0], "1", "an image of one bounce", errors[1]),
         Row(
             f"{name}.time",
             figures["seconds"],
@@ -124,8 +132,8 @@ def room_figures(scene: Scene, effort: Effort, context: moderngl.Context) -> Fig
     share = one_bounce.irradiance[reference.valid].mean() / reference.irradiance[reference.valid].mean()
     return {
         **drawn,
+        **({"one_bounce_relmse": alone["relmse"]} if "relmse" in alone else {}),
         "one_bounce": float(share),
-        "one_bounce_relmse": alone["relmse"],
         "seconds": seconds["all"],
         "one_bounce_seconds": seconds["one"],
     }
@@ -186,7 +194,8 @@ def room_table(made: list[Row]) -> str:
     }
     lines = ["| | least | median | greatest |", "|---|---|---|---|"]
     for label, (figure, of, digits) in shown.items():
-        values = [of(row) for row in made if row.name.endswith(f".{figure}")]
+        every = [of(row) for row in made if row.name.endswith(f".{figure}")]
+        values = [value for value in every if not math.isnan(value)]
         cells = " | ".join(f"{each:.{digits}f}" for each in (min(values), median(values), max(values)))
         lines.append(f"| {label} | {cells} |")
     return "\n".join(lines)
@@ -197,9 +206,9 @@ def choice_table(found: dict[tuple[int, float], list[Figures]]) -> str:
     lines = ["| walks | later discs ÷ first | relMSE, mean | energy |", "|---|---|---|---|"]
     for (walks, share), rooms in found.items():
         energies = [room["energy"] for room in rooms]
+        errors = [room["relmse"] for room in rooms if "relmse" in room]
         lines.append(
-            f"| {walks:,} | {share:g} | {fmean(room['relmse'] for room in rooms):.4f} "
-            f"| {min(energies):.3f} … {max(energies):.3f} |"
+            f"| {walks:,} | {share:g} | {fmean(errors):.4f} | {min(energies):.3f} … {max(energies):.3f} |"
         )
     return "\n".join(lines)
 
@@ -217,10 +226,12 @@ def _score(runtime: Runtime, config: TunedConfig, view: View, reference: Referen
     captured = runtime.capture(view, config, maps=False)
     seen = CapturedView(view, reference, captured).valid
     image = captured.indirect_irradiance[seen]
-    return {
-        "energy": float(image.mean(dtype=np.float64) / reference.irradiance[seen].mean(dtype=np.float64)),
-        "relmse": trimmed_relmse(image, reference.irradiance_a[seen], reference.irradiance_b[seen]),
-    }
+    energy = image.mean(dtype=np.float64) / reference.irradiance[seen].mean(dtype=np.float64)
+    figures = {"energy": float(energy)}
+    if noise_floor(reference) <= MOST_NOISE:
+        halves = reference.irradiance_a[seen], reference.irradiance_b[seen]
+        figures["relmse"] = trimmed_relmse(image, *halves)
+    return figures
 
 
 def _kept(name: str, effort: Effort, measure: Callable[[], Figures]) -> Figures:

@@ -1,5 +1,6 @@
 """`bench all_bounces`: its measure, its tables from made-up figures, a small run; a run continues."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -47,7 +48,11 @@ def test_noise_of_the_reference_and_the_worst_pixels_do_not_count():
 def test_rows_and_table():
     other = ROOM | {"energy": 1.02, "seconds": 5.0}
     made = [*room_rows("a", ROOM), *room_rows("b", other), *room_rows("c", ROOM | {"one_bounce": 0.7})]
+    # Its reference has too much noise for a relMSE.
+    made += room_rows("d", {name: value for name, value in ROOM.items() if "relmse" not in name})
     rows = {row.name: row for row in made}
+    assert math.isnan(rows["d.relmse"].value)
+    assert "| relMSE, all bounces | 0.0100 | 0.0100 | 0.0100 |" in room_table(made)
     assert rows["a.time"].ratio == 1.5
     assert rows["a.relmse"].ratio == pytest.approx(1 / 30)
     assert "| one bounce has of all light | 0.40 | 0.40 | 0.70 |" in room_table(made)
@@ -56,7 +61,7 @@ def test_rows_and_table():
 
 
 def test_choices_are_a_mean_and_a_range():
-    rooms = [{"energy": 0.97, "relmse": 0.01}, {"energy": 1.01, "relmse": 0.02}]
+    rooms = [{"energy": 0.97, "relmse": 0.01}, {"energy": 1.01, "relmse": 0.02}, {"energy": 1.0}]
     assert "| 2,048 | 0.5 | 0.0150 | 0.970 … 1.010 |" in choice_table({(2048, 0.5): rooms})
 
 

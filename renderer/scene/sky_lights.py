@@ -8,20 +8,22 @@ Shadows from so few directions would be hard, and so direct light comes along ra
 Only the light of narrow parts, such as a sun's, has its shadows from its map.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, Int64
+from jaxtyping import Float32, Float64, Int64
 
 from vpltune.renderer.scene.environment import Environment
 from vpltune.renderer.scene.scene import Light
-from vpltune.renderer.scene.sky_parts import SkyParts, median_cut, part_middles, sky_parts
+from vpltune.renderer.scene.sky_parts import ROWS, SkyParts, median_cut, part_middles, sky_parts
 
 RAYS = 1024
 """Directions that all parts together are cut into, about; fewer where the sky has fewer lit texels. A choice:
 a pixel takes 16 of them."""
 LEAST_RAYS_OF_A_PART = 32
 """Rays that a part has however many parts there are, unless it has fewer texels. A choice."""
+TEXEL = np.pi / ROWS
+"""Angle in radians that a texel is high, and wide at the horizon."""
 _NARROW = 0.06
 """Widest half angle in radians of a part with hard shadows. A choice, 3.4°: about one texel of the map
 that is cut, which is all that is known of a sun's size."""
@@ -47,6 +49,14 @@ class SkyLights:
     """Unit vectors towards the light of the other parts, part by part; parts that follow are neighbours."""
     ray_flux: Float32[np.ndarray, "rays 3"] = field(default_factory=lambda: np.zeros((0, 3), np.float32))
     """W/m² on a surface square to each."""
+    texel_towards: Float32[np.ndarray, "texels 3"] = field(
+        default_factory=lambda: np.zeros((0, 3), np.float32)
+    )
+    """Unit vectors towards the texels that the rays stand for, ray by ray; texels are `TEXEL` wide."""
+    texel_flux: Float32[np.ndarray, "texels 3"] = field(default_factory=lambda: np.zeros((0, 3), np.float32))
+    """W/m² on a surface square to each; those of a ray add up to its own."""
+    ray_texels: Int64[np.ndarray, "rays 2"] = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+    """First and number of each ray's texels."""
 
     def open_irradiance(self, normals: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, "n 3"]:
         """W/m² along the rays on surfaces with these unit normals that nothing hides."""
@@ -68,8 +78,7 @@ def sky_lights(environment: Environment, count: int) -> SkyLights:
         Light("directional", fluxes[i], direction_world=-middles[i], name="sky")
         for i in np.argsort(~narrow, kind="stable")
     )
-    towards, flux = _rays(parts, middles, narrow)
-    return SkyLights(lights, int(narrow.sum()), towards, flux)
+    return _with_rays(SkyLights(lights, int(narrow.sum())), parts, middles, np.flatnonzero(~narrow))
 
 
 def _half_angles(parts: SkyParts, middles: Float64[np.ndarray, "parts 3"]) -> Float64[np.ndarray, " parts"]:
@@ -79,20 +88,40 @@ def _half_angles(parts: SkyParts, middles: Float64[np.ndarray, "parts 3"]) -> Fl
     return np.arccos(np.clip(2.0 * mean - 1.0, -1.0, 1.0))
 
 
-def _rays(
-    parts: SkyParts, middles: Float64[np.ndarray, "parts 3"], narrow: Bool[np.ndarray, " parts"]
-) -> tuple[Float32[np.ndarray, "rays 3"], Float32[np.ndarray, "rays 3"]]:
-    towards: list[np.ndarray] = [np.zeros((0, 3))]
-    flux: list[np.ndarray] = [np.zeros((0, 3))]
-    wide = np.flatnonzero(~narrow)
-    most = max(LEAST_RAYS_OF_A_PART, RAYS // max(1, len(wide)))
+def _with_rays(
+    sky: SkyLights,
+    parts: SkyParts,
+    middles: Float64[np.ndarray, "parts 3"],
+    wide: Int64[np.ndarray, " wide"],
+) -> SkyLights:
+    """`sky` with rays to the wide parts."""
+    if not len(wide):
+        return sky
+    most = max(LEAST_RAYS_OF_A_PART, RAYS // len(wide))
+    order: list[np.ndarray] = []  # texels, ray by ray
+    rays: list[np.ndarray] = []  # the ray of each of them
+    towards: list[np.ndarray] = []
     for part in _chained(middles, wide):
-        own = parts.owner == part
-        directions, own_flux, power = parts.directions[own], parts.flux[own], parts.power[own]
-        piece = median_cut(directions, power, most)
-        towards.append(part_middles(directions, power, piece))
-        flux.append(np.stack([np.bincount(piece, own_flux[:, channel]) for channel in range(3)], axis=1))
-    return np.concatenate(towards).astype(np.float32), np.concatenate(flux).astype(np.float32)
+        own = np.flatnonzero(parts.owner == part)
+        piece = median_cut(parts.directions[own], parts.power[own], most)
+        piece_middles = part_middles(parts.directions[own], parts.power[own], piece)
+        # Neighbours in the chain are neighbours in the sky: where one is seen, the next may be.
+        chain = _chained(piece_middles, np.arange(len(piece_middles)))
+        place = np.argsort(chain)[piece]
+        order.append(own[np.argsort(place, kind="stable")])
+        rays.append(np.sort(place) + sum(map(len, towards)))
+        towards.append(piece_middles[chain])
+    texels, ray = np.concatenate(order), np.concatenate(rays)
+    count = np.bincount(ray)
+    flux = parts.flux[texels]
+    return replace(
+        sky,
+        ray_towards=np.concatenate(towards).astype(np.float32),
+        ray_flux=np.stack([np.bincount(ray, each) for each in flux.T], axis=1).astype(np.float32),
+        texel_towards=parts.directions[texels].astype(np.float32),
+        texel_flux=flux.astype(np.float32),
+        ray_texels=np.stack([np.cumsum(count) - count, count], axis=1),
+    )
 
 
 def _chained(middles: Float64[np.ndarray, "parts 3"], chosen: Int64[np.ndarray, " chosen"]) -> list[int]:

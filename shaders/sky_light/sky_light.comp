@@ -1,14 +1,22 @@
-// Sky light: irradiance from the sky along rays, for the interleaved filter, or in place of what the filter made.
+// Sky light, part 3: irradiance from the sky along rays, for the interleaved filter, or in place of what the filter made.
 //
-// Reads: G-buffer, ray hierarchy, sky rays, open irradiance; with LISTED_PIXELS, the pixel list and the irradiance that
-// this is added to. Writes: irradiance [W/m²], alpha 1 where a surface is.
-// Constants: SKY_LIFT, OPEN_NODES, BLOCK (pixels along its side), LISTED_PIXELS (only pixels of the list). Python: renderer/frame/passes/sky_light.py.
+// Reads: G-buffer, ray hierarchy, sky rays, open irradiance; with SKY_GUIDED, bits of the pixels' rays and candidates of the
+// tiles; with LISTED_PIXELS, the pixel list and the irradiance that this is added to. Writes: irradiance [W/m²], alpha 1
+// where a surface is.
+// Constants: SKY_LIFT, SKY_TEXEL, SKY_WORDS, SKY_GUIDED (tiles have looked at the sky), OPEN_NODES, BLOCK (pixels along its
+// side, and along that of a tile), LISTED_PIXELS (only pixels of the list). Python: renderer/frame/passes/sky_light.py.
 //
 // The rays are shared out among the pixels of a block. A window of the filter holds each ray once, so that what it shows
 // has shadows from all of them. What a pixel gets is a ratio: the share of its own rays' light that arrives, of all that
 // would arrive in the open. So open places have no noise, nor do borders of the image.
+//
+// Indoors few rays pass, and the ratio is rough. Where a tile's surroundings are mostly blocked, a pixel casts as many rays
+// again, all to the candidates of its tile, and takes its first rays for what of the sky is no candidate.
+// First, since common/ray_alpha.glsl includes it only where there are holes.
+#include "common/hash.glsl"
 #include "common/gbuffer.glsl"
 #include "common/ray_hierarchy.glsl"
+#include "common/sky_rays.glsl"
 #if LISTED_PIXELS
 #include "common/pixel_list.glsl"
 #endif
@@ -16,15 +24,6 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(rgba32f, binding = IRRADIANCE_IMAGE) writeonly uniform image2D out_irradiance;
-
-struct SkyRay {
-    vec4 towards;  // unit, in the world; w unused
-    vec4 flux;     // [W/m²] on a surface square to the ray; w unused
-};
-
-layout(std430, binding = SKY_RAYS_BINDING) readonly buffer SkyRays {
-    SkyRay sky_rays[];  // 32 for each part of the sky, fewer for parts of few texels
-};
 
 layout(std430, binding = SKY_OPEN_BINDING) readonly buffer SkyOpen {
     vec4 sky_open[];  // [OPEN_NODES, OPEN_NODES] irradiance [W/m²] in the open, at nodes of the octahedral map of normals
@@ -48,16 +47,97 @@ vec3 open_irradiance(vec3 normal) {
         mix(sky_open[at + OPEN_NODES].rgb, sky_open[at + OPEN_NODES + 1].rgb, blend.x), blend.y);
 }
 
-// A pixel's first ray, below `stride`: its place in its block, in the order of a Bayer matrix. Neighbours are far apart in
-// that order, so they take rays of other parts of the sky.
-int first_ray(ivec2 pixel) {
-    int place = 0;
-    for (int bit = 0; (BLOCK >> bit) > 1; ++bit) {
-        int across = (pixel.x ^ pixel.y) >> bit & 1;
-        place = place << 2 | across << 1 | (pixel.y >> bit & 1);
-    }
-    return place * stride / (BLOCK * BLOCK);
+#if SKY_GUIDED
+layout(std430, binding = SKY_BITS_BINDING) readonly buffer SkyBits {
+    uint sky_bits[];  // [pixels]: which of a pixel's first rays are open
+};
+
+uint open_bits(ivec2 pixel) {
+    return sky_bits[pixel.y * imageSize(out_irradiance).x + pixel.x];
 }
+#endif
+
+// Irradiance as the share of the rays' light that arrives.
+vec3 shared_irradiance(ivec2 pixel, Receiver receiver, vec3 origin) {
+#if SKY_GUIDED && !LISTED_PIXELS
+    uint bits = open_bits(pixel);  // of the same rays
+#endif
+    vec3 arriving = vec3(0.0);
+    vec3 sent = vec3(0.0);
+    for (int i = first_sky_ray(pixel, stride); i < ray_count; i += stride) {
+        SkyTexel sky = own_sky_ray(pixel, i);
+        vec3 light = sky.flux.rgb * max(dot(receiver.normal_world, sky.towards.xyz), 0.0);
+        sent += light;
+#if SKY_GUIDED && !LISTED_PIXELS
+        bool is_open = (bits & 1u) != 0u;
+        bits >>= 1;
+#else
+        bool is_open = light.r + light.g + light.b > 0.0
+                    && sees_sky(origin, sky.towards.xyz, longest, sky_seed(pixel, i));
+#endif
+        arriving += is_open ? light : vec3(0.0);
+    }
+    return open_irradiance(receiver.normal_world) * arriving / max(sent, vec3(1e-30));
+}
+
+#if SKY_GUIDED
+layout(std430, binding = SKY_CANDIDATES_BINDING) readonly buffer SkyCandidates {
+    // [tiles, 1 + SKY_WORDS]: number of candidates, and 1 where most rays are open; then bits of 32 rays each, and the
+    // number of candidates before them.
+    uvec2 sky_candidates[];
+};
+
+uniform int probe_stride;  // `stride` of the rays whose bits they are
+
+// The candidate number `n` of the tile whose entries begin at `start`.
+int candidate(int start, uint n) {
+    int low = 0;
+    int high = SKY_WORDS;
+    while (high - low > 1) {
+        int middle = (low + high) / 2;
+        if (sky_candidates[start + 1 + middle].y <= n) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    uvec2 word = sky_candidates[start + 1 + low];
+    for (uint i = word.y; i < n; ++i) {
+        word.x &= word.x - 1u;
+    }
+    return 32 * low + findLSB(word.x);
+}
+
+// Irradiance from candidates along new rays, and from the rest of the sky along the pixel's first rays.
+vec3 guided_irradiance(ivec2 pixel, Receiver receiver, vec3 origin, int start, uint candidates) {
+    vec3 arriving = vec3(0.0);
+    int taken = 0;
+    for (int i = first_sky_ray(pixel, stride); i < ray_count && candidates > 0u; i += stride) {
+        uint seed = sky_seed(pixel, i);
+        float n = (float(i) + unit_number(hashed(seed))) / float(ray_count) * float(candidates);
+        SkyTexel sky = sky_place(candidate(start, min(uint(n), candidates - 1u)), fract(n), seed);
+        vec3 light = sky.flux.rgb * max(dot(receiver.normal_world, sky.towards.xyz), 0.0);
+        if (light.r + light.g + light.b > 0.0 && sees_sky(origin, sky.towards.xyz, longest, seed)) {
+            arriving += light;
+        }
+        ++taken;
+    }
+    vec3 irradiance = arriving * (float(candidates) / float(max(taken, 1)));
+    uint bits = open_bits(pixel);
+    int first = first_sky_ray(pixel, probe_stride);
+    int probes = (ray_count - first + probe_stride - 1) / probe_stride;
+    while (bits != 0u) {
+        int ray = first + findLSB(bits) * probe_stride;
+        bits &= bits - 1u;
+        if ((sky_candidates[start + 1 + ray / 32].x >> (ray % 32) & 1u) == 0u) {
+            SkyTexel sky = own_sky_ray(pixel, ray);
+            float cosine = max(dot(receiver.normal_world, sky.towards.xyz), 0.0);
+            irradiance += sky.flux.rgb * (cosine * float(ray_count) / float(probes));
+        }
+    }
+    return irradiance;
+}
+#endif
 
 void main() {
 #if LISTED_PIXELS
@@ -65,32 +145,24 @@ void main() {
 #else
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
 #endif
-    if (pixel.x < 0 || any(greaterThanEqual(pixel, imageSize(out_irradiance)))) {
+    ivec2 size = imageSize(out_irradiance);
+    if (pixel.x < 0 || any(greaterThanEqual(pixel, size))) {
         return;
     }
     Receiver receiver = gbuffer_receiver(pixel);
     vec3 irradiance = vec3(0.0);
     if (receiver.valid) {
-        float away = max(longest, distance(camera_to_world[3].xyz, receiver.position_world));
-        vec3 origin = receiver.position_world + receiver.normal_world * (SKY_LIFT * away);
-        vec3 arriving = vec3(0.0);
-        vec3 sent = vec3(0.0);
-        for (int i = first_ray(pixel); i < ray_count; i += stride) {
-            vec3 towards = sky_rays[i].towards.xyz;
-            float cosine = dot(receiver.normal_world, towards);
-            if (cosine <= 0.0) {
-                continue;
-            }
-#ifdef RAYS_MEET_HOLES
-            ray_seed = uint(i) ^ uint(pixel.y * 65536 + pixel.x);
+        vec3 origin = sky_origin(receiver, longest);
+#if SKY_GUIDED
+        ivec2 tile = pixel / BLOCK;
+        int start = (tile.y * ((size.x + BLOCK - 1) / BLOCK) + tile.x) * (1 + SKY_WORDS);
+        uvec2 candidates = sky_candidates[start];
+        irradiance = candidates.y != 0u
+            ? shared_irradiance(pixel, receiver, origin)
+            : guided_irradiance(pixel, receiver, origin, start, candidates.x);
+#else
+        irradiance = shared_irradiance(pixel, receiver, origin);
 #endif
-            vec3 light = sky_rays[i].flux.rgb * cosine;
-            sent += light;
-            if (ray_hit(origin, towards, longest).triangle == RAY_NO_TRIANGLE) {
-                arriving += light;
-            }
-        }
-        irradiance = open_irradiance(receiver.normal_world) * arriving / max(sent, vec3(1e-30));
     }
 #if LISTED_PIXELS
     irradiance += texelFetch(base, pixel, 0).rgb;

@@ -11,6 +11,7 @@ from vpltune.renderer.errors import InputError
 
 if TYPE_CHECKING:
     from vpltune.renderer.scene.environment import Environment
+    from vpltune.renderer.scene.mitsuba_import.sun_sky import BakedSunSky, SunSky
 
 ENVIRONMENT_SUFFIX = ".environment.exr"
 """What takes the place of .glb in the name of the environment's file."""
@@ -38,9 +39,10 @@ def import_scene(
     from vpltune.renderer.files.atomic_file import require_writable
     from vpltune.renderer.scene.mitsuba_import import read_mitsuba
     from vpltune.renderer.scene.placement.sidecar_file import sidecar_path
+    from vpltune.tuner.doctor.extras import is_installed
 
     require_writable(output.parent)
-    loaded = read_mitsuba(scene)
+    loaded = read_mitsuba(scene, _baked_sun_sky if is_installed("mitsuba") else None)
     warn(loaded.warnings)
     sky = None if loaded.environment is None else _write_environment(loaded.environment, output)
     write_glb(output, loaded, notes=loaded.warnings)
@@ -62,6 +64,13 @@ def import_scene(
     )
     beside = () if sky is None else (f"wrote {escape(sky)} and {escape(str(sidecar_path(output)))}",)
     return Report(document, (shown, *beside))
+
+
+def _baked_sun_sky(model: "SunSky") -> "BakedSunSky":
+    # Only scenes with such an emitter wait for Mitsuba to load.
+    from vpltune.tuner.reference.sun_sky_baking import baked_sun_sky
+
+    return baked_sun_sky(model)
 
 
 def _write_environment(environment: "Environment", output: Path) -> str:

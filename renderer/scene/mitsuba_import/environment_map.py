@@ -13,8 +13,6 @@ from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin
 
 ENVIRONMENTS = ("constant", "envmap")
 """The types of emitters that are read here."""
-SKY_MODELS = ("sky", "sun", "sunsky")
-"""Emitters that compute a sky; they are ignored."""
 # A choice: how far a transform may be from a rotation of one scale before that is said, relative.
 _TOLERANCE = 1e-4
 
@@ -51,11 +49,16 @@ def environment_of(emitter: Plugin, folder: SceneFolder, warnings: Warnings) -> 
     planes = environment_planes(content, name, emitter.number("scale", 1.0), f"{emitter.where}: {name!r:.80}")
     if not any(plane.any() for plane in planes):
         return None
-    return baked_environment(planes, _turn(emitter, warnings))
+    return baked_environment(planes, turn_of(emitter, warnings))
 
 
-def _turn(emitter: Plugin, warnings: Warnings) -> Float64[np.ndarray, "3 3"]:
-    """The rotation of `to_world`, mirrored if that is: the nearest to the matrix (Higham 1986)."""
+def turn_of(emitter: Plugin, warnings: Warnings) -> Float64[np.ndarray, "3 3"]:
+    """The rotation of `to_world`, mirrored if that is: the nearest to the matrix (Higham 1986).
+
+    Args:
+        emitter: a plugin that is an environment.
+        warnings: takes a line if the matrix stretches, too.
+    """
     matrix = emitter.to_world()[:3, :3]
     left, stretch, right = np.linalg.svd(matrix)
     if stretch[0] - stretch[2] > _TOLERANCE * stretch[0]:

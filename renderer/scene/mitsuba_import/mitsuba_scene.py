@@ -14,11 +14,12 @@ from vpltune.renderer.scene.files.plain_numbers import plain_number
 from vpltune.renderer.scene.files.reading_border import read_at_border, require_few_placed
 from vpltune.renderer.scene.files.surface import require_within, turned
 from vpltune.renderer.scene.mitsuba_import.emitters import area_emission, punctual_light
-from vpltune.renderer.scene.mitsuba_import.environment_map import ENVIRONMENTS, SKY_MODELS, environment_of
+from vpltune.renderer.scene.mitsuba_import.environment_map import ENVIRONMENTS, environment_of
 from vpltune.renderer.scene.mitsuba_import.materials import MaterialReader, Surfacing
 from vpltune.renderer.scene.mitsuba_import.plugin_tree import Plugin, plugin_tree
 from vpltune.renderer.scene.mitsuba_import.searched_folder import SearchedFolder
 from vpltune.renderer.scene.mitsuba_import.shapes import Shape, ShapeReader, wound_by_normals
+from vpltune.renderer.scene.mitsuba_import.sun_sky import SUN_SKIES, Baker, SunSkyReader
 from vpltune.renderer.scene.mitsuba_import.xml_tree import parse_xml
 from vpltune.renderer.scene.scene import Camera, Instance, Light, Mesh, Scene
 from vpltune.renderer.scene.transforms import without_scale
@@ -27,22 +28,27 @@ from vpltune.renderer.scene.transforms import without_scale
 _SILENT = ("integrator", "sampler", "film", "rfilter", "bsdf", "texture")
 
 
-def read_mitsuba(path: str | Path) -> Scene:
+def read_mitsuba(path: str | Path, bake: Baker | None = None) -> Scene:
     """Read a Mitsuba XML scene of version 0.5 to 3.
 
     Lengths and radiometric values keep their numbers. Files that the scene refers to must be in its folder or
     below. `Scene.warnings` lists what is approximated or ignored.
 
+    Args:
+        path: the scene file.
+        bake: computes the emitters `sky`, `sun` and `sunsky`. Without it they are ignored.
+
     Raises:
         InputError: the scene is invalid or unsupported. The message is one line with file, line and cause.
     """
     path = Path(path)
-    return read_at_border(path, lambda: _Import(path).scene())
+    return read_at_border(path, lambda: _Import(path, bake).scene())
 
 
 @dataclass(eq=False)
 class _Import:
     path: Path
+    bake: Baker | None
     warnings: Warnings = field(default_factory=Warnings)
     decoded: DecodedBytes = field(default_factory=DecodedBytes)
     meshes: list[Mesh] = field(default_factory=list)
@@ -98,11 +104,12 @@ class _Import:
     def _lights(self, root: Plugin) -> Environment | None:
         """Add the punctual lights; returns the environment, if there is one."""
         environment = None
+        skies = SunSkyReader(root.version.startswith("0."), self.bake, self.warnings)
         for emitter in root.of_kind("emitter"):
-            if emitter.type in SKY_MODELS:
-                self.warnings.add(
-                    f"emitter '{emitter.type}' is ignored: skies are read from images, not computed"
-                )
+            if emitter.type in SUN_SKIES:
+                sky, sun = skies.read(emitter, environment is not None)
+                environment = sky if environment is None else environment
+                self.lights += [] if sun is None else [sun]
             elif emitter.type in ENVIRONMENTS:
                 if environment is not None:
                     self.warnings.add(f"{emitter.where} is ignored: a scene has one environment")

@@ -47,6 +47,8 @@ class Plugin:
     """Nested or referenced plugins, each with its snake_case name, or an empty one."""
     search_paths: list[tuple[str, str]] = field(default_factory=list)
     """The folders of a scene's <path> elements, each with its line and tag."""
+    version: str = ""
+    """The scene's version of Mitsuba, or an empty text."""
 
     def number(self, name: str, absent: float) -> float:
         """A number."""
@@ -107,7 +109,9 @@ def plugin_tree(root: XmlNode) -> Plugin:
     """
     if root.tag != "scene":
         raise SceneFileError(f"{root.where}: the root element of a Mitsuba scene must be <scene>")
-    return _Reader().plugin(root)
+    scene = _Reader().plugin(root)
+    scene.version = root.attributes.get("version", "").strip()
+    return scene
 
 
 class _Reader:

@@ -42,6 +42,14 @@ def test_halves_of_a_texture_count_by_area():
     np.testing.assert_allclose(means, [[0.75] * 3, [0.25] * 3], atol=0.07)
 
 
+@pytest.mark.parametrize("tiles", [4, 16, 32, 100])
+def test_a_tiled_floor_has_the_mean_of_its_tiles(tiles):
+    """Two triangles with chequers of two by two texels, so often. 16 places that keep step with them see one
+    colour alone. To 0.05: the edges of 961 pieces."""
+    chequers = texture_of([[WHITE, BLACK], [BLACK, WHITE]])
+    np.testing.assert_allclose(mean_texels(chequers, tiles * CORNERS), 0.5, atol=0.05)
+
+
 @pytest.mark.parametrize(
     ("wrap", "expected"), [("repeat", 1.0), ("mirrored_repeat", 0.0), ("clamp_to_edge", 0.0)]
 )

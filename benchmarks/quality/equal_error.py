@@ -25,12 +25,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from benchmarks.harness.processor_seconds import check_software, frame_seconds
 from benchmarks.harness.row import Row
 from benchmarks.harness.scene_library import OWN_SCENES, scene_and_view
 from vpltune.renderer.config.light_settings import ONE_BOUNCE
-from vpltune.renderer.config.tuned_config import TunedConfig, read_config
-from vpltune.renderer.errors import MachineError
-from vpltune.renderer.frame.frame_timing import truthful_clock
+from vpltune.renderer.config.tuned_config import read_config
 from vpltune.renderer.frame.runtime import Runtime
 from vpltune.renderer.scene.scene import Scene
 from vpltune.renderer.scene.views import View
@@ -181,11 +180,7 @@ def equal_error(scene: Path | int, effort: Effort) -> EqualError:
     read, view = loaded(scene, effort.size)
     half_a, half_b, seen = reference_halves(scene, effort)
     runtime, config = Runtime(read), replace(read_config("default"), light=ONE_BOUNCE)
-    if truthful_clock(runtime.opengl_renderer) == "gpu":
-        raise MachineError(
-            f"equal_error: frames must be drawn by a software renderer, got {runtime.opengl_renderer}; "
-            "try: LIBGL_ALWAYS_SOFTWARE=1"
-        )
+    check_software(runtime, "equal_error")
     captured = runtime.capture(view, config, maps=False)
     valid = seen & captured.valid
 
@@ -211,15 +206,6 @@ def equal_error(scene: Path | int, effort: Effort) -> EqualError:
     count, seconds = needed[fastest]
     check = traced_run(peers[fastest], max(2, 2 * round(count / 2)), 1 + effort.rounds, error)
     return EqualError(min(frames), relmse, fastest, seconds, check)
-
-
-def frame_seconds(runtime: Runtime, view: View, config: TunedConfig) -> float:
-    """Processor seconds of one frame, until it is finished."""
-    runtime.context.finish()
-    start = time.process_time()
-    runtime.draw(view, config)
-    runtime.context.finish()
-    return time.process_time() - start
 
 
 def traced_run(

@@ -43,10 +43,9 @@ from vpltune.renderer.frame.passes.vpl_gather import (
 from vpltune.renderer.frame.passes.vpl_importance import VplImportancePass, importance_cells
 from vpltune.renderer.frame.passes.vpl_visibility_maps import VplVisibilityMapsPass
 from vpltune.renderer.frame.rsm_resolution import rsm_resolution
-from vpltune.renderer.frame.runtime_options import RuntimeOptions
+from vpltune.renderer.frame.runtime_options import DEFAULT_OPTIONS, RuntimeOptions
 from vpltune.renderer.frame.visibility_map_layout import VisibilityMapLayout
 from vpltune.renderer.frame.vpl_pools import DiscPool, VplPools
-from vpltune.renderer.frame.walk_samples import WALKS
 from vpltune.renderer.gpu.camera_uniforms import CameraUniforms, camera_uniforms
 from vpltune.renderer.gpu.glowing_triangles import GlowingTriangles
 from vpltune.renderer.gpu.ray_hierarchy import RayHierarchy
@@ -93,7 +92,14 @@ class FrameSetup:
 
     @classmethod
     def of(
-        cls, view: View, config: TunedConfig, nested_faces: int, *, glows: bool, sky_lights: int = 0
+        cls,
+        view: View,
+        config: TunedConfig,
+        nested_faces: int,
+        *,
+        glows: bool,
+        sky_lights: int = 0,
+        options: RuntimeOptions = DEFAULT_OPTIONS,
     ) -> "FrameSetup":
         """The set-up that draws `view` with `config`.
 
@@ -103,10 +109,18 @@ class FrameSetup:
             nested_faces: of each sun in the scene.
             glows: whether a surface of the scene glows.
             sky_lights: lights that stand for the scene's sky.
+            options: give the walks and the share of VPLs of later light.
         """
         count, bounces = config.parameters.vpl_count, config.light.most_bounces
         has_lights = bool(view.lights) or sky_lights > 0
-        pools = VplPools.of(count, has_lights=has_lights, glows=glows, bounces=bounces)
+        pools = VplPools.of(
+            count,
+            has_lights=has_lights,
+            glows=glows,
+            bounces=bounces,
+            walks=options.walks,
+            later_share=options.later_share,
+        )
         return cls(
             size=view.size,
             face_count=face_count(view.lights, nested_faces) + sky_lights,
@@ -294,7 +308,7 @@ class Frame:
             emitting = DiscPool.glowing(pools.glowing)
         starts = None
         if pools.later and has_lamps:
-            starts = walk_table(WALKS if emitting is None else WALKS // 2)[:, :2]
+            starts = walk_table(options.walks if emitting is None else options.walks // 2)[:, :2]
         light: list[FramePass] = [
             VirtualPointLightsPass(
                 resources,
@@ -312,7 +326,13 @@ class Frame:
         if pools.later:
             assert hierarchy is not None, "light walks along rays"
             walks = LightWalksPass(
-                resources, hierarchy, setup.bounces, emitting, pools.later, has_lamps=has_lamps
+                resources,
+                hierarchy,
+                setup.bounces,
+                emitting,
+                pools.later,
+                options.walks,
+                has_lamps=has_lamps,
             )
             light.append(walks)
             discs.append(DiscPool.later(pools.later, walks.sample_count))

@@ -16,7 +16,7 @@ from vpltune.renderer.frame.drawn_frame import DrawnFrame, on_own_context
 from vpltune.renderer.frame.frame import Frame, FrameSetup, frame_light_records
 from vpltune.renderer.frame.frame_pass import FrameInputs
 from vpltune.renderer.frame.frame_timing import PassClock, frame_milliseconds
-from vpltune.renderer.frame.runtime_options import RuntimeOptions
+from vpltune.renderer.frame.runtime_options import DEFAULT_OPTIONS, RuntimeOptions
 from vpltune.renderer.frame.visibility_map_layout import NO_MAPS
 from vpltune.renderer.frame.vpl_pools import VplPools
 from vpltune.renderer.gpu.glowing_triangles import GlowingTriangles
@@ -34,7 +34,6 @@ from vpltune.renderer.scene.working_scale import working_scale
 Layer = Literal["final", "direct", "indirect", "irradiance", "albedo", "normal", "depth"]
 LAYERS: tuple[Layer, ...] = get_args(Layer)
 
-DEFAULT_OPTIONS = RuntimeOptions()
 KEPT_FRAMES = 2
 """Frames whose targets stay on the GPU: two, for a comparison of two configs; more would add up."""
 
@@ -343,7 +342,9 @@ class Runtime:
 
     def _setup(self, view: View, config: TunedConfig) -> FrameSetup:
         glows, sky = self._glowing.count > 0, len(self._sky(config.light.sky_lights).lights)
-        return FrameSetup.of(view, config, self._nested_faces, glows=glows, sky_lights=sky)
+        return FrameSetup.of(
+            view, config, self._nested_faces, glows=glows, sky_lights=sky, options=self.options
+        )
 
     def _sky(self, count: int) -> SkyLights:
         environment = self._scene.environment

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from vpltune.renderer.frame.point_table import PointTable
+from vpltune.renderer.frame.vpl_pools import LATER_SHARE
+from vpltune.renderer.frame.walk_samples import WALKS
 
 LightPath = Literal["auto", "volumes", "tiles"]
 RsmFiltering = Literal[1, 3, 5, 9]
@@ -32,6 +34,12 @@ class RuntimeOptions:
     """Whether a directional light's RSM keeps its grid while bounds move: its size changes in steps, its
     position by whole texels. Otherwise it fits the bounds, and shadows and VPLs crawl with them."""
 
+    walks: int = WALKS
+    """Light walks of a frame, an even number: half of them may begin on glowing surfaces."""
+
+    later_share: float = LATER_SHARE
+    """VPLs of later light for each VPL that the config asks for, see `LATER_SHARE`."""
+
     def __post_init__(self) -> None:
         if self.light_path not in get_args(LightPath):
             raise ValueError(f"light_path: must be one of {get_args(LightPath)}, got {self.light_path!r}")
@@ -41,3 +49,10 @@ class RuntimeOptions:
             raise ValueError(
                 f"rsm_filtering: must be one of {get_args(RsmFiltering)}, got {self.rsm_filtering!r}"
             )
+        if self.walks < 2 or self.walks % 2:
+            raise ValueError(f"walks: must be an even number, 2 or more, got {self.walks!r}")
+        if not self.later_share > 0.0:
+            raise ValueError(f"later_share: must be more than 0, got {self.later_share!r}")
+
+
+DEFAULT_OPTIONS = RuntimeOptions()

@@ -13,7 +13,9 @@ from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.frame.capture import CapturedFrame
 from vpltune.renderer.frame.frame import FrameSetup
 from vpltune.renderer.frame.runtime import Runtime
-from vpltune.renderer.frame.vpl_pools import VplPools
+from vpltune.renderer.frame.runtime_options import RuntimeOptions
+from vpltune.renderer.frame.vpl_pools import VPL_BYTES, VplPools
+from vpltune.renderer.frame.walk_samples import STEPS_OF_ALL
 from vpltune.renderer.scene.scene import Camera, Light, Mesh, Scene, scaled
 from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View, scaled_view
@@ -195,6 +197,27 @@ def test_no_light_is_gained_where_walks_leave_the_scene(gl_context):
     captured = drawn(gl_context, cornered, view, config_of("all"))
     first, later = captured.vpl_flux[:512].sum(axis=0), captured.vpl_flux[512:].sum(axis=0)
     assert (later > 0.0).all() and (later < 0.5 * first * 0.7 / (1.0 - 0.7)).all()
+
+
+def test_a_program_may_choose_walks_and_the_share_of_later_discs(gl_context):
+    """A quarter of the walks and half of the discs: as much light, to 5 %, which is what walks are spread by;
+    without the options it is that of the default."""
+    view, options = room_view("spot", (32, 24)), RuntimeOptions(walks=1024, later_share=0.25)
+    light = []
+    for chosen, later in ((options, 128), (RuntimeOptions(), 256)):
+        drawn = Runtime(colored_room(), chosen, context=gl_context).draw(view, config_of("all"))
+        assert drawn.frame.setup.pools == VplPools(512, later)
+        samples = drawn.frame.resources.buffer("later_samples").size
+        assert samples == chosen.walks * STEPS_OF_ALL * VPL_BYTES
+        light.append(drawn.capture(maps=False).vpl_flux[512:].sum(axis=0))
+    np.testing.assert_allclose(light[0], light[1], rtol=0.05)
+    assert (light[0] != light[1]).all()
+
+
+@pytest.mark.parametrize(("name", "value"), [("walks", 0), ("walks", 4095), ("later_share", 0.0)])
+def test_walks_that_cannot_be_are_refused(name, value):
+    with pytest.raises(ValueError, match=f"{name}: must be .*, got {value}"):
+        RuntimeOptions(**{name: value})
 
 
 def test_one_bounce_without_glow_has_one_kind_of_vpls(gl_context):

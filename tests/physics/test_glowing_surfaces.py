@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from built_scenes import quad, scene_of
-from polygon_irradiance import polygon_irradiance
 
+from benchmarks.harness.polygon_irradiance import polygon_irradiance
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.light_settings import LightSettings
 from vpltune.renderer.config.quality import Quality

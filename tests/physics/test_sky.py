@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from built_scenes import quad, scene_of
-from polygon_irradiance import polygon_irradiance
 
+from benchmarks.harness.polygon_irradiance import polygon_irradiance
+from benchmarks.harness.sky_scenes import RADIANCE, room, table
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.light_settings import LightSettings
 from vpltune.renderer.config.quality import Quality
@@ -17,8 +18,6 @@ from vpltune.renderer.scene.scene import Camera, Scene, scaled
 from vpltune.renderer.scene.sky_lights import sky_lights
 from vpltune.renderer.scene.transforms import look_at
 from vpltune.renderer.scene.views import View, scaled_view
-
-RADIANCE = (3.0, 2.0, 1.0)
 
 
 def config_of(sky_lights: int) -> TunedConfig:
@@ -103,24 +102,10 @@ def test_light_through_a_window_is_as_soft_as_the_sky_is_wide(gl_context, side_o
     Small frames have 1,024 rays for two by two pixels, of which a place sees tens. In large ones tiles find
     out where the window is, and half of all rays go there: 0.033, where rays that do not know have 0.124.
     """
-    low, high, side = 0.8, 1.6, 0.5
-    walls = [
-        quad((-2, 0, -2), (0, 0, 4), (4, 0, 0)),
-        quad((-2, 2, -2), (4, 0, 0), (0, 0, 4)),
-        quad((-2, 0, -2), (4, 0, 0), (0, 2, 0)),
-        quad((-2, 0, 2), (0, 2, 0), (4, 0, 0)),
-        quad((-2, 0, -2), (0, 2, 0), (0, 0, 4)),
-        quad((2, 0, -2), (0, 0, 4), (0, low, 0)),
-        quad((2, high, -2), (0, 0, 4), (0, 2 - high, 0)),
-        quad((2, low, -2), (0, 0, 2 - side), (0, high - low, 0)),
-        quad((2, low, side), (0, 0, 2 - side), (0, high - low, 0)),
-    ]
-    scene = under_sky(walls)
-    view = replace(view_from((-1.0, 1.8, 0.0), (0.6, 0.0, 0.0), 1.0), size=(side_of_frame,) * 2)
-    frame = Runtime(scene, context=gl_context).capture(view, config_of(32), maps=False)
-    floor = frame.valid & (frame.position_world[..., 1] < 0.01)
-    window = np.array([[2, low, -side], [2, high, -side], [2, high, side], [2, low, side]], np.float64)
-    expected = polygon_irradiance(window, frame.position_world[floor], np.array([0.0, 1.0, 0.0]))
+    scene = room("window", (side_of_frame, side_of_frame), (0.8, 1.6), 0.5)
+    frame = Runtime(scene.scene, context=gl_context).capture(scene.view, config_of(32), maps=False)
+    floor = scene.floor(frame)
+    expected = scene.exact(frame.position_world[floor])
     got = frame.direct_irradiance[floor][:, 0] / RADIANCE[0]
     assert floor.sum() > 2000
     assert got.mean() == pytest.approx(expected.mean(), rel=mean_error)
@@ -129,14 +114,11 @@ def test_light_through_a_window_is_as_soft_as_the_sky_is_wide(gl_context, side_o
 
 def test_under_a_table_it_is_dark_by_what_the_table_hides(gl_context):
     """A square of side 2 at height 1 over open ground: π less its form factor. Pointwise 1 % of the mean."""
-    ground = quad((-10, 0, -10), (0, 0, 20), (20, 0, 0))
-    scene = under_sky([ground, quad((-1, 1, -1), (2, 0, 0), (0, 0, 2))])
-    view = replace(view_from((0.0, 0.5, 3.0), (0.0, 0.0, 0.0), 0.8), size=(96, 96))
-    frame = Runtime(scene, context=gl_context).capture(view, config_of(32), maps=False)
-    floor = frame.valid & (frame.position_world[..., 1] < 0.01)
-    table = np.array([[-1, 1, -1], [1, 1, -1], [1, 1, 1], [-1, 1, 1]], np.float64)
-    hidden = polygon_irradiance(table, frame.position_world[floor], np.array([0.0, 1.0, 0.0]))
-    got, expected = frame.direct_irradiance[floor][:, 0] / RADIANCE[0], np.pi - hidden
+    scene = table((96, 96))
+    frame = Runtime(scene.scene, context=gl_context).capture(scene.view, config_of(32), maps=False)
+    floor = scene.floor(frame)
+    expected = scene.exact(frame.position_world[floor])
+    got = frame.direct_irradiance[floor][:, 0] / RADIANCE[0]
     assert got.mean() == pytest.approx(expected.mean(), rel=0.015)
     assert np.sqrt(((got - expected) ** 2).mean()) < 0.01 * expected.mean()
 

@@ -19,7 +19,8 @@ from vpltune.renderer.config.scene_statistics import STATISTIC_NAMES
 from vpltune.renderer.config.tuned_config import TunedConfig
 from vpltune.renderer.files.atomic_file import written_whole
 from vpltune.renderer.files.cache_folder import cache_folder
-from vpltune.renderer.frame.runtime import DEFAULT_OPTIONS, Runtime
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.frame.runtime_options import DEFAULT_OPTIONS
 from vpltune.renderer.frame.visibility_map_layout import VisibilityMapLayout
 from vpltune.renderer.scene.placement import views_for_scene
 from vpltune.renderer.scene.scene import Scene

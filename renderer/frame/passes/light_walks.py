@@ -6,7 +6,7 @@ from jaxtyping import Float32
 from vpltune.renderer.frame.frame_pass import FrameInputs, FramePass
 from vpltune.renderer.frame.visibility_map_layout import FRAME_TURNS_OVER
 from vpltune.renderer.frame.vpl_pools import VPL_BYTES, DiscPool
-from vpltune.renderer.frame.walk_samples import WALKS, recorded_steps, walk_steps
+from vpltune.renderer.frame.walk_samples import recorded_steps, walk_steps
 from vpltune.renderer.gpu.gpu_program import ComputeProgram
 from vpltune.renderer.gpu.ray_hierarchy import RayHierarchy
 from vpltune.renderer.gpu.resources import Resources
@@ -48,20 +48,21 @@ class LightWalksPass(FramePass):
         bounces: int | None,
         glowing: DiscPool | None,
         disc_count: int,
+        walks: int,
         *,
         has_lamps: bool,
     ):
-        self._disc_count = disc_count
+        self._disc_count, self._walk_count = disc_count, walks
         self._hierarchy = hierarchy
         self._lamp_steps, self._glowing_steps = walk_steps(bounces)
         steps = recorded_steps(bounces, has_lamps=has_lamps, glows=glowing is not None)
-        self.sample_count = WALKS * steps
+        self.sample_count = walks * steps
         """Samples that it leaves, dark ones included."""
         context = resources.context
         resources["later_starts"] = context.buffer(reserve=disc_count * VPL_BYTES)
         resources["later_samples"] = context.buffer(reserve=self.sample_count * VPL_BYTES)
         shares = int(has_lamps) + int(glowing is not None)
-        directions = np.repeat(walk_table(WALKS // shares)[:, 2:], shares, axis=0)
+        directions = np.repeat(walk_table(walks // shares)[:, 2:], shares, axis=0)
         resources["walk_directions"] = context.buffer(np.ascontiguousarray(directions).tobytes())
         defines = {
             "WALK_LAMPS": int(has_lamps),
@@ -97,8 +98,8 @@ class LightWalksPass(FramePass):
         """Walk, then weigh the samples."""
         self._hierarchy.update()
         self._walks.dispatch(
-            -(-WALKS // 64),
-            walk_count=WALKS,
+            -(-self._walk_count // 64),
+            walk_count=self._walk_count,
             longest=inputs.scene_diagonal,
             lamp_steps=self._lamp_steps,
             glowing_steps=self._glowing_steps,
@@ -106,7 +107,7 @@ class LightWalksPass(FramePass):
         )
         self._statistics.dispatch(
             1,
-            walk_count=WALKS,
+            walk_count=self._walk_count,
             disc_count=self._disc_count,
             moment_origin=inputs.records.moment_origin,
         )

@@ -10,7 +10,8 @@ from own_reference import own_reference
 from vpltune.renderer.config.artist_parameters import ArtistParameters
 from vpltune.renderer.config.quality import Quality
 from vpltune.renderer.config.tuned_config import TunedConfig
-from vpltune.renderer.frame.runtime import DEFAULT_OPTIONS, Runtime
+from vpltune.renderer.frame.runtime import Runtime
+from vpltune.renderer.frame.runtime_options import DEFAULT_OPTIONS
 from vpltune.tuner.prior import prior_library
 from vpltune.tuner.prior.loss_table import default_point, table_loss
 from vpltune.tuner.prior.scene_generator import generated_scene

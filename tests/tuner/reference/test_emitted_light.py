@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from polygon_irradiance import polygon_irradiance
 
+from benchmarks.harness.polygon_irradiance import polygon_irradiance
 from vpltune.renderer.errors import InputError
 from vpltune.renderer.scene.environment import Environment, even_sky, solid_angles
 from vpltune.renderer.scene.files.surface import turned

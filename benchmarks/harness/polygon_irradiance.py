@@ -1,9 +1,14 @@
 """Irradiance from an even polygon, in closed form."""
 
 import numpy as np
+from jaxtyping import Float
 
 
-def polygon_irradiance(corners: np.ndarray, points: np.ndarray, normal: np.ndarray) -> np.ndarray:
+def polygon_irradiance(
+    corners: Float[np.ndarray, "corners 3"],
+    points: Float[np.ndarray, "*points 3"],
+    normal: Float[np.ndarray, "3"],
+) -> Float[np.ndarray, "*points"]:
     """E ÷ L of an even polygon over the horizon of each point.
 
     Lambert (1760); Baum et al. (1989), "Improving Radiosity Solutions Through the Use of Analytically

@@ -9,7 +9,7 @@ from vpltune.renderer.gpu.resources import Resources
 from vpltune.renderer.gpu.rigid_pieces import RigidPiece, rigid_pieces
 from vpltune.renderer.gpu.scene_buffers import SceneBuffers
 from vpltune.renderer.scene.scene import Material, Scene
-from vpltune.renderer.scene.triangle_texels import equal_pieces, mean_texels
+from vpltune.renderer.scene.triangle_texels import equal_pieces, mean_stopped_texels
 
 GLOWING_READS = ("glowing_triangles", "glowing_places")
 """What a program declares that includes `common/glowing_triangles.glsl`."""
@@ -69,7 +69,8 @@ def _records(scene: Scene, piece: RigidPiece, place: int, cuts: int) -> np.ndarr
     material = scene.materials[mesh.material]
     corners = piece.corners.astype(np.float64)
     uv = mesh.uv[mesh.triangles[piece.triangles]].astype(np.float64)
-    if material.emission_texture is not None and cuts > 1:
+    has_holes = material.texture is not None and not material.is_opaque
+    if cuts > 1 and (material.emission_texture is not None or has_holes):
         weights = equal_pieces(cuts)
         corners = np.einsum("kvw,twa->tkva", weights, corners).reshape(-1, 3, 3)
         uv = np.einsum("kvw,twa->tkva", weights, uv).reshape(-1, 3, 2)
@@ -86,9 +87,13 @@ def _records(scene: Scene, piece: RigidPiece, place: int, cuts: int) -> np.ndarr
 def _radiance(
     scene: Scene, material: Material, uv: Float64[np.ndarray, "triangles 3 2"]
 ) -> Float64[np.ndarray, "triangles 3"]:
-    """The mean radiance of each triangle in W/(m² sr)."""
-    # A blended surface emits by the share of the light that it stops.
-    emission = np.array(material.emission) * (material.opacity if material.is_blended else 1.0)
-    if material.emission_texture is None:
+    """The mean radiance of each triangle in W/(m² sr): a hole emits nothing, and a see-through surface by the
+    share of the light that it stops."""
+    emission = np.array(material.emission)
+    if material.emission_texture is None and material.is_opaque:
         return np.broadcast_to(emission, (len(uv), 3))
-    return emission * mean_texels(scene.textures[material.emission_texture], uv)
+    glow, base = (
+        None if index is None else scene.textures[index]
+        for index in (material.emission_texture, material.texture)
+    )
+    return emission * mean_stopped_texels(glow, uv, material, base)

@@ -1,5 +1,7 @@
 """The mean of a texture over each triangle, and how a triangle is cut into equal ones."""
 
+from collections.abc import Callable
+
 import numpy as np
 from jaxtyping import Float64, Int64
 
@@ -16,6 +18,9 @@ _MOST_FINER = 1024
 _AT_A_TIME = 1 << 20
 """Places that are looked up at a time. A choice: about 100 MiB of temporaries."""
 
+Places = Float64[np.ndarray, "triangles places 2"]
+"""Texture coordinates."""
+
 
 def mean_texels(
     texture: Texture, uv: Float64[np.ndarray, "triangles 3 2"], material: Material | None = None
@@ -30,32 +35,67 @@ def mean_texels(
         material: whose holes count for nothing, and whose see-through places count by their opacity; None
             takes every place alike. So does a triangle that is all hole.
     """
-    means = _means_of_pieces(texture, uv, material, _CUTS)
-    height, width, _ = texture.texels_srgb.shape
+
+    def looked_up(places: Places) -> Float64[np.ndarray, "triangles places 7"]:
+        colors = _colors(texture, places)
+        weights = _shares_stopped(texture, material, places)[..., None]
+        return np.concatenate([colors, weights * colors, weights], axis=-1)
+
+    means = _means(looked_up, uv, texture)
+    plain, weighted, weight = means[:, :3], means[:, 3:6], means[:, 6:]
+    return np.where(weight > 0.0, weighted / np.where(weight > 0.0, weight, 1.0), plain)
+
+
+def mean_stopped_texels(
+    texture: Texture | None,
+    uv: Float64[np.ndarray, "triangles 3 2"],
+    material: Material,
+    base: Texture | None,
+) -> Float64[np.ndarray, "triangles 3"]:
+    """The mean linear colour of a texture times the share of light that the surface stops there.
+
+    Args:
+        texture: the image; None is white.
+        uv: texture coordinates of the corners.
+        material: of the surface.
+        base: its base colour texture, whose opacity makes the holes.
+    """
+
+    def looked_up(places: Places) -> Float64[np.ndarray, "triangles places 3"]:
+        colors = 1.0 if texture is None else _colors(texture, places)
+        return colors * (_shares_stopped(base, material, places)[..., None] * np.ones(3))
+
+    return _means(looked_up, uv, texture or base)
+
+
+def _means(
+    looked_up: Callable[[Places], np.ndarray],
+    uv: Float64[np.ndarray, "triangles 3 2"],
+    texture: Texture | None,
+) -> Float64[np.ndarray, "triangles values"]:
+    """The mean of what is looked up, over each triangle; with many places where it has most texels of
+    `texture`."""
+    means = _means_of_pieces(looked_up, uv, _CUTS)
+    height, width = (1, 1) if texture is None else texture.texels_srgb.shape[:2]
     sides = np.nan_to_num(uv[:, 1:] - uv[:, :1])
     texels = 0.5 * np.abs(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]) * width * height
     most = np.argsort(-texels, kind="stable")[:_MOST_FINER]
     finer = most[texels[most] > _CUTS**2]
-    means[finer] = _means_of_pieces(texture, uv[finer], material, _FINER_CUTS)
+    if len(finer):
+        means[finer] = _means_of_pieces(looked_up, uv[finer], _FINER_CUTS)
     return means
 
 
 def _means_of_pieces(
-    texture: Texture, uv: Float64[np.ndarray, "triangles 3 2"], material: Material | None, cuts: int
-) -> Float64[np.ndarray, "triangles 3"]:
-    means = np.empty((len(uv), 3))
+    looked_up: Callable[[Places], np.ndarray], uv: Float64[np.ndarray, "triangles 3 2"], cuts: int
+) -> Float64[np.ndarray, "triangles values"]:
     middles = equal_pieces(cuts).mean(axis=1)
     step = _AT_A_TIME // len(middles)
-    for start in range(0, len(uv), step):
-        rows = slice(start, start + step)
-        places = np.einsum("kw,twa->tka", middles, uv[rows])
-        line, column = _nearest_texels(texture, places)
-        colors = linear_from_srgb(texture.texels_srgb[line, column] / 255.0)
-        weights = _weights(texture, material, line, column)
-        total = weights.sum(axis=1, keepdims=True)
-        weights = np.where(total > 0.0, weights, 1.0)
-        means[rows] = (colors * weights[..., None]).sum(axis=1) / weights.sum(axis=1, keepdims=True)
-    return means
+    means = []
+    for start in range(0, max(1, len(uv)), step):
+        places = np.einsum("kw,twa->tka", middles, uv[start : start + step])
+        means.append(looked_up(places).mean(axis=1))
+    return np.concatenate(means)
 
 
 def equal_pieces(count: int) -> Float64[np.ndarray, "pieces 3 3"]:
@@ -71,17 +111,24 @@ def equal_pieces(count: int) -> Float64[np.ndarray, "pieces 3 3"]:
     return np.concatenate([1.0 - place.sum(axis=2, keepdims=True), place], axis=2)
 
 
-def _weights(
-    texture: Texture, material: Material | None, line: np.ndarray, column: np.ndarray
+def _colors(texture: Texture, places: Places) -> Float64[np.ndarray, "triangles places 3"]:
+    return linear_from_srgb(texture.texels_srgb[_nearest_texels(texture, places)] / 255.0)
+
+
+def _shares_stopped(
+    texture: Texture | None, material: Material | None, places: Places
 ) -> Float64[np.ndarray, "triangles places"]:
-    if material is None or material.is_opaque or texture.opacity is None:
-        return np.ones(line.shape)
-    opacity = material.opacity * texture.opacity[line, column] / 255.0
+    """Share of the light in [0, 1] that the surface stops at each place: 0 in a hole."""
+    if material is None or material.is_opaque:
+        return np.ones(places.shape[:2])
+    opacity = np.full(places.shape[:2], float(material.opacity))
+    if texture is not None and texture.opacity is not None:
+        opacity *= texture.opacity[_nearest_texels(texture, places)] / 255.0
     return opacity if material.is_blended else (opacity >= material.alpha_cutoff).astype(np.float64)
 
 
 def _nearest_texels(
-    texture: Texture, uv: Float64[np.ndarray, "triangles places 2"]
+    texture: Texture, uv: Places
 ) -> tuple[Int64[np.ndarray, "triangles places"], Int64[np.ndarray, "triangles places"]]:
     """Row and column of the texel next to each place."""
     height, width, _ = texture.texels_srgb.shape

@@ -8,7 +8,7 @@ from built_scenes import quad, scene_of
 
 from vpltune.renderer.scene.scene import Texture
 from vpltune.renderer.scene.triangle_albedo import triangle_albedo
-from vpltune.renderer.scene.triangle_texels import equal_pieces, mean_texels
+from vpltune.renderer.scene.triangle_texels import equal_pieces, mean_stopped_texels, mean_texels
 
 BLACK, WHITE = (0, 0, 0), (255, 255, 255)
 CORNERS = np.array([[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[1.0, 1.0], [0.0, 1.0], [1.0, 0.0]]])
@@ -68,3 +68,15 @@ def test_holes_count_for_nothing(mode, expected):
     mesh = replace(scene.meshes[0], uv=np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32))
     scene = replace(scene, materials=(material,), textures=(leaf,), meshes=(mesh,))
     assert triangle_albedo(scene, mesh).mean() == pytest.approx(expected, abs=0.07)
+
+
+@pytest.mark.parametrize(("mode", "expected"), [("opaque", 1.0), ("mask", 0.5), ("blend", 0.45)])
+def test_a_hole_emits_nothing(mode, expected):
+    """The right half of the base texture is a hole, the left nine tenths opaque. So is half of a white glow,
+    and none of one that is white on the left alone. Two triangles share the square: to 0.07, as above."""
+    scene = scene_of([quad((0, 0, 0), (1, 0, 0), (0, 1, 0))], [(1.0, 1.0, 1.0)], "sign")
+    material = replace(scene.materials[0], texture=0, alpha_mode=mode)
+    base = texture_of([[WHITE, WHITE]], [[230, 0]])
+    for glow, seen in ((None, expected), (texture_of([[WHITE, BLACK]]), min(expected, 0.5))):
+        means = mean_stopped_texels(glow, CORNERS, material, base)
+        np.testing.assert_allclose(means.mean(axis=0), seen, atol=0.07)

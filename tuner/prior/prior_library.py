@@ -54,7 +54,7 @@ ROTATIONS = {32: _ROTATIONS, 128: _ROTATIONS[:2], 512: _ROTATIONS[:1]}
 """VPL counts, and the rotations of the point table at each. A choice: few VPLs are noisy, and the prior must
 not learn the noise of a single placement."""
 
-CAPTURE_VERSION = 10
+CAPTURE_VERSION = 11
 """Increase it whenever a code change gives other statistics or losses for the same scene. Old cache entries
 are then ignored. Runtime options, quality and the layout of the maps are in the key anyway."""
 

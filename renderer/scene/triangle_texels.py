@@ -10,9 +10,9 @@ from vpltune.renderer.scene.scene import Material, Texture, Wrap
 
 _CUTS = 4
 """Texels are looked up in the middles of this number, squared, of equal pieces of a triangle. A choice."""
-_FINER_CUTS = 31
-"""The same for the triangles with the most texels. A choice: a floor of two triangles may have tiles of which
-16 places see a few. A prime, so that places do not keep step with the tiles."""
+_FINER_PLACES = 1024
+"""Places in the triangles with the most texels. A choice: a floor of two triangles may have tiles of which 16
+places see a few. They are irregular (`_even_places`), so as not to keep step with the tiles."""
 _MOST_FINER = 1024
 """How many triangles are cut finer. A choice: a million places, a tenth of a second."""
 _AT_A_TIME = 1 << 20
@@ -27,7 +27,7 @@ def mean_texels(
 ) -> Float64[np.ndarray, "triangles 3"]:
     """The mean linear colour of a texture over each triangle.
 
-    It is that of the nearest texels of 16 places, or of 961 in the triangles with the most texels.
+    It is that of the nearest texels of 16 places, or of 1,024 in the triangles with the most texels.
 
     Args:
         texture: the image.
@@ -75,27 +75,38 @@ def _means(
 ) -> Float64[np.ndarray, "triangles values"]:
     """The mean of what is looked up, over each triangle; with many places where it has most texels of
     `texture`."""
-    means = _means_of_pieces(looked_up, uv, _CUTS)
+    means = _means_at(looked_up, uv, equal_pieces(_CUTS).mean(axis=1))
     height, width = (1, 1) if texture is None else texture.texels_srgb.shape[:2]
     sides = np.nan_to_num(uv[:, 1:] - uv[:, :1])
     texels = 0.5 * np.abs(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]) * width * height
     most = np.argsort(-texels, kind="stable")[:_MOST_FINER]
     finer = most[texels[most] > _CUTS**2]
     if len(finer):
-        means[finer] = _means_of_pieces(looked_up, uv[finer], _FINER_CUTS)
+        means[finer] = _means_at(looked_up, uv[finer], _even_places(_FINER_PLACES))
     return means
 
 
-def _means_of_pieces(
-    looked_up: Callable[[Places], np.ndarray], uv: Float64[np.ndarray, "triangles 3 2"], cuts: int
+def _means_at(
+    looked_up: Callable[[Places], np.ndarray],
+    uv: Float64[np.ndarray, "triangles 3 2"],
+    barycentric: Float64[np.ndarray, "places 3"],
 ) -> Float64[np.ndarray, "triangles values"]:
-    middles = equal_pieces(cuts).mean(axis=1)
-    step = _AT_A_TIME // len(middles)
+    step = _AT_A_TIME // len(barycentric)
     means = []
     for start in range(0, max(1, len(uv)), step):
-        places = np.einsum("kw,twa->tka", middles, uv[start : start + step])
+        places = np.einsum("kw,twa->tka", barycentric, uv[start : start + step])
         means.append(looked_up(places).mean(axis=1))
     return np.concatenate(means)
+
+
+def _even_places(count: int) -> Float64[np.ndarray, "places 3"]:
+    """Barycentric coordinates of places that fill a triangle evenly, in no regular order.
+
+    Points of the R2 sequence (Roberts 2018), which steps by the inverse powers of the root of x³ = x + 1.
+    """
+    root = 1.32471795724474602596
+    u, v = ((0.5 + np.arange(1, count + 1) * root**-power) % 1.0 for power in (1.0, 2.0))
+    return np.stack([1.0 - np.sqrt(u), np.sqrt(u) * (1.0 - v), np.sqrt(u) * v], axis=1)
 
 
 def equal_pieces(count: int) -> Float64[np.ndarray, "pieces 3 3"]:

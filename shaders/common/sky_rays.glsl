@@ -2,7 +2,7 @@
 //
 // Provides: the structs, `sky_place`, `first_sky_ray`, `sky_seed`, `own_sky_ray`, `sky_origin`, `sees_sky`. Needs common/gbuffer.glsl,
 // common/ray_hierarchy.glsl and common/hash.glsl.
-// Constants: SKY_GUIDED, SKY_TEXEL [rad], SKY_LIFT and BLOCK (pixels along its side) of renderer/frame/passes/sky_light.py.
+// Constants: SKY_GUIDED, SKY_TEXEL [rad], SKY_LIFT, SKY_LEAST_LIFT and BLOCK (pixels along its side) of renderer/frame/passes/sky_light.py.
 
 struct SkyRay {
     vec4 towards;  // unit, in the world, to the middle of its light; the first of its texels
@@ -66,8 +66,8 @@ SkyTexel own_sky_ray(ivec2 pixel, int ray) {
 
 // Where the rays of a receiver start. `longest` is the scene's diagonal.
 vec3 sky_origin(Receiver receiver, float longest) {
-    float away = max(longest, distance(camera_to_world[3].xyz, receiver.position_world));
-    return receiver.position_world + receiver.normal_world * (SKY_LIFT * away);
+    float away = distance(camera_to_world[3].xyz, receiver.position_world);
+    return receiver.position_world + receiver.normal_world * (SKY_LIFT * away + SKY_LEAST_LIFT * longest);
 }
 
 // Whether a ray leaves the scene.

@@ -3,20 +3,21 @@
 // Reads: G-buffer, ray hierarchy, sky rays, open irradiance; with SKY_GUIDED, bits of the pixels' rays and candidates of the
 // tiles; with LISTED_PIXELS, the pixel list and the irradiance that this is added to. Writes: irradiance [W/m²], alpha 1
 // where a surface is.
-// Constants: SKY_LIFT, SKY_TEXEL, SKY_WORDS, SKY_GUIDED (tiles have looked at the sky), OPEN_NODES, BLOCK (pixels along its
+// Constants: SKY_LIFT, SKY_LEAST_LIFT, SKY_TEXEL, SKY_WORDS, SKY_GUIDED (tiles have looked at the sky), OPEN_NODES, BLOCK (pixels along its
 // side, and along that of a tile), LISTED_PIXELS (only pixels of the list). Python: renderer/frame/passes/sky_light.py.
 //
 // The rays are shared out among the pixels of a block. A window of the filter holds each ray once, so that what it shows
-// has shadows from all of them. What a pixel gets is a ratio: the share of its own rays' light that arrives, of all that
+// has shadows from all of them. To what arrives along its own rays, a pixel adds the same share of all other light that
 // would arrive in the open. So open places have no noise, nor do borders of the image.
 //
-// Indoors few rays pass, and the ratio is rough. Where a tile's surroundings are mostly blocked, a pixel casts as many rays
+// Indoors few rays pass, and the share is rough. Where a tile's surroundings are mostly blocked, a pixel casts as many rays
 // again, all to the candidates of its tile, and takes its first rays for what of the sky is no candidate.
 // First, since common/ray_alpha.glsl includes it only where there are holes.
 #include "common/hash.glsl"
 #include "common/gbuffer.glsl"
 #include "common/ray_hierarchy.glsl"
 #include "common/sky_rays.glsl"
+#include "common/mean_flux.glsl"
 #if LISTED_PIXELS
 #include "common/pixel_list.glsl"
 #endif
@@ -57,13 +58,15 @@ uint open_bits(ivec2 pixel) {
 }
 #endif
 
-// Irradiance as the share of the rays' light that arrives.
+// Irradiance as what arrives along the pixel's rays, and as the share of them that arrives of what they leave out of the
+// open sky. The share is one for all channels: where a pixel has no ray to a red patch of the sky, others speak for it.
 vec3 shared_irradiance(ivec2 pixel, Receiver receiver, vec3 origin) {
 #if SKY_GUIDED && !LISTED_PIXELS
     uint bits = open_bits(pixel);  // of the same rays
 #endif
     vec3 arriving = vec3(0.0);
     vec3 sent = vec3(0.0);
+    int taken = 0;
     for (int i = first_sky_ray(pixel, stride); i < ray_count; i += stride) {
         SkyTexel sky = own_sky_ray(pixel, i);
         vec3 light = sky.flux.rgb * max(dot(receiver.normal_world, sky.towards.xyz), 0.0);
@@ -76,8 +79,12 @@ vec3 shared_irradiance(ivec2 pixel, Receiver receiver, vec3 origin) {
                     && sees_sky(origin, sky.towards.xyz, longest, sky_seed(pixel, i));
 #endif
         arriving += is_open ? light : vec3(0.0);
+        ++taken;
     }
-    return open_irradiance(receiver.normal_world) * arriving / max(sent, vec3(1e-30));
+    float weight = float(ray_count) / float(max(taken, 1));
+    // A pixel whose rays all lie below its horizon counts as open: in a blocked place that is rare.
+    float share = mean_flux(sent) > 0.0 ? mean_flux(arriving) / mean_flux(sent) : 1.0;
+    return weight * arriving + share * (open_irradiance(receiver.normal_world) - weight * sent);
 }
 
 #if SKY_GUIDED
@@ -165,7 +172,7 @@ void main() {
 #endif
     }
 #if LISTED_PIXELS
-    irradiance += texelFetch(base, pixel, 0).rgb;
+    irradiance = max(irradiance, vec3(0.0)) + texelFetch(base, pixel, 0).rgb;
 #endif
     imageStore(out_irradiance, pixel, vec4(irradiance, receiver.valid ? 1.0 : 0.0));
 }

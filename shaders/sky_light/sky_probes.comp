@@ -1,7 +1,7 @@
 // Sky light, part 1: which of their rays to the sky are open at the pixels of a tile. One workgroup for each tile.
 //
 // Reads: G-buffer, ray hierarchy, sky rays. Writes: bits of each pixel's rays; bits and numbers of each tile's.
-// Constants: SKY_LIFT, SKY_WORDS, BLOCK. Python: renderer/frame/passes/sky_light.py.
+// Constants: SKY_LIFT, SKY_LEAST_LIFT, SKY_WORDS, BLOCK. Python: renderer/frame/passes/sky_light.py.
 // First, since common/ray_alpha.glsl includes it only where there are holes.
 #include "common/hash.glsl"
 #include "common/gbuffer.glsl"

@@ -119,7 +119,8 @@ void main() {
     if (alone || (REFINE != 0 && needs_full_gather(window))) {
         append_pixel(pixel);
     }
-    vec3 irradiance = window.sum.rgb / window.sum.a;
+    // What pixels of a coloured sky add up to may be a little below 0.
+    vec3 irradiance = max(window.sum.rgb, vec3(0.0)) / window.sum.a;
     if (ADD_BASE != 0) {
         irradiance += texelFetch(base, pixel, 0).rgb;
     }

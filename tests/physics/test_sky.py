@@ -146,6 +146,34 @@ def test_few_and_many_lights_are_of_one_sky(gl_context, lights):
     np.testing.assert_allclose(got, np.pi, rtol=0.02)
 
 
+@pytest.mark.parametrize("size", [(48, 48), (280, 240)])
+def test_a_red_patch_in_a_blue_sky_shines_on_pixels_without_a_ray_to_it(gl_context, size):
+    """Of 1,024 rays some ten go to the patch, and a pixel of a large frame takes sixteen. Open ground gets
+    all of the sky in every channel: to 1 %, the resampling of the map."""
+    directions = texel_directions(64, 128)
+    radiance = np.where(directions[..., 1:2] > np.cos(0.25), [1.0, 0.0, 0.0], [0.0, 0.3, 1.0])
+    environment = Environment(radiance.astype(np.float32))
+    scene = replace(under_sky([quad((-10, 0, -10), (0, 0, 20), (20, 0, 0))]), environment=environment)
+    view = replace(view_from((0.0, 3.0, 0.01)), size=size)
+    frame = Runtime(scene, context=gl_context).capture(view, config_of(32), maps=False)
+    facing = np.maximum(directions[..., 1], 0.0) * solid_angles(64, 128)[:, None]
+    expected = np.einsum("hwc,hw->c", environment.radiance.astype(np.float64), facing)
+    np.testing.assert_allclose(frame.direct_irradiance[frame.valid].mean(axis=0), expected, rtol=0.01)
+
+
+def test_rays_start_below_what_stands_low_on_a_large_ground(gl_context):
+    """A plate of 2 × 2 m, 5 cm over the middle of 6 × 6 km. What reaches the floor half a metre within its
+    edge comes from the sides alone: a tenth of the open sky's at most. Rays that began above it had all."""
+    ground = quad((-3000, 0, -3000), (0, 0, 6000), (6000, 0, 0))
+    plate = quad((-1, 0.05, -1), (2, 0, 0), (0, 0, 2))
+    view = replace(view_from((0.0, 0.03, 0.6), (0.0, 0.0, -0.1), 0.8), size=(96, 96))
+    frame = Runtime(under_sky([ground, plate]), context=gl_context).capture(view, config_of(32), maps=False)
+    place = frame.position_world
+    below = frame.valid & (place[..., 1] < 0.01) & (np.abs(place[..., [0, 2]]) < 0.5).all(axis=-1)
+    assert below.sum() > 400
+    assert frame.direct_irradiance[below][:, 0].mean() / RADIANCE[0] < 0.1 * np.pi
+
+
 @pytest.mark.parametrize("seed", [0, 1])
 def test_rays_and_narrow_lights_have_all_of_the_light(seed):
     """Narrow lights and rays add up to the flux of the whole map, to the rounding of float32."""

@@ -28,9 +28,11 @@ REACH = 2
 """Tiles to each side that tell a tile which rays to cast. A choice: 24 tiles of 8 × 8 pixels test each ray 24
 times, so that one which passes in a tenth of the places is found in 92 %."""
 LIFT = 2e-5
-"""A ray starts so far above its surface, in diagonals of the scene or distances from the camera. A choice:
-the G-buffer's depth has 7 digits."""
-
+"""A ray starts so far above its surface, in distances from the camera. A choice: the G-buffer's depth has 7
+digits."""
+LEAST_LIFT = 1e-6
+"""And this, in diagonals of the scene: coordinates have 7 digits too. A choice: of 5 km it is 5 mm. With
+2e-5, the rays of a floor on such a ground began above what stood on it."""
 OPEN_NODES = 33
 """Nodes along the side of the table of irradiance in the open. A choice: 4° apart, so that straight lines
 between them err by 0.1 %."""
@@ -84,6 +86,7 @@ class SkyLightPass(FramePass):
         defines = {
             **hierarchy.defines,
             "SKY_LIFT": LIFT,
+            "SKY_LEAST_LIFT": LEAST_LIFT,
             "SKY_TEXEL": TEXEL,
             "SKY_WORDS": words,
             "SKY_REACH": REACH,

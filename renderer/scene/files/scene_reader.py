@@ -23,8 +23,8 @@ def read_scene(path: str | Path) -> Scene:
     """Read a scene from a .gltf, .glb, .obj or .ply file.
 
     Files that the scene refers to must be in its folder or below; nothing is fetched. `Scene.warnings` has a
-    line for each thing that is ignored or approximated. What the sidecar beside the file says of camera, lights
-    and sky is not part of it: `vpltune.fit` and the commands look there, and
+    line for each thing that is ignored or approximated. What the sidecar beside the file says of camera,
+    lights and sky is not part of it: `vpltune.fit` and the commands look there, and
     `vpltune.renderer.scene.placement.with_environment` gives a scene the sidecar's sky.
 
     Raises:

@@ -34,8 +34,8 @@ class IrradianceFilter:
         relight: whether neighbours count as if they had a pixel's normal.
         refine: whether pixels with too few or too uneven neighbours go into `pixel_list`.
         add_base: whether `base` is added.
-        least_share: of a block's pixels: where a window has fewer on a pixel's surface, the pixel goes into
-            `pixel_list` too.
+        least_share: share of a block's pixels, in [0, 1]. A pixel goes into `pixel_list` too where fewer
+            pixels of its window are on its surface.
         largest_error: squared, relative to the mean's square, from which a pixel goes into that list.
     """
 

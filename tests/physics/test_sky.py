@@ -148,8 +148,8 @@ def test_few_and_many_lights_are_of_one_sky(gl_context, lights):
 
 @pytest.mark.parametrize("size", [(48, 48), (280, 240)])
 def test_a_red_patch_in_a_blue_sky_shines_on_pixels_without_a_ray_to_it(gl_context, size):
-    """Of 1,024 rays some ten go to the patch, and a pixel of a large frame takes sixteen. Open ground gets
-    all of the sky in every channel: to 1 %, the resampling of the map."""
+    """Some ten rays of 1,024 go to the patch, and a pixel of a large frame takes sixteen. Open ground gets
+    all of the sky in every channel: to 1 %, for the resampling of the map."""
     directions = texel_directions(64, 128)
     radiance = np.where(directions[..., 1:2] > np.cos(0.25), [1.0, 0.0, 0.0], [0.0, 0.3, 1.0])
     environment = Environment(radiance.astype(np.float32))

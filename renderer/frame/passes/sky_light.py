@@ -20,6 +20,8 @@ block."""
 LEAST_SHARE = 0.125
 """Share of the pixels of a block: where fewer are on a pixel's surface, the pixel takes as many rays itself.
 A choice of 1/4 and 1/8, by the time in a room full of plants and mouldings."""
+LISTED_STRIDE = round(1.0 / LEAST_SHARE)
+"""From one ray of such a pixel to its next."""
 LEAST_RAYS = 12
 """Rays of a pixel, at least: of fewer, all might lie below its horizon. A choice."""
 MOST_BITS = 32
@@ -129,7 +131,7 @@ class SkyLightPass(FramePass):
             self._block,
             reads=("shared_irradiance as interleaved", "lamp_irradiance as base"),
             target=target,
-            least_share=LEAST_SHARE if self._stride > 1 else 0.0,
+            least_share=LEAST_SHARE if self._stride > LISTED_STRIDE else 0.0,
             add_base=True,
         )
         self._listed = ComputeProgram(
@@ -151,6 +153,6 @@ class SkyLightPass(FramePass):
         self._program.dispatch(*self._groups, **uniforms, stride=self._stride)
         self._resources.write("pixel_list", EMPTY_DISPATCH)
         self._filter.draw(inputs)
-        if self._stride > 1:
-            stride = round(1.0 / LEAST_SHARE)
-            self._listed.dispatch_indirect("pixel_list", **uniforms, stride=stride)
+        # Where rays are few, a pixel takes as many of them from the start.
+        if self._stride > LISTED_STRIDE:
+            self._listed.dispatch_indirect("pixel_list", **uniforms, stride=LISTED_STRIDE)
